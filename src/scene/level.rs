@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::{ImageSettings, Scene, VolumeSource, load};
 use crate::settings::camera::{Camera, Projection};
-use crate::volume::{Access, Grid, ReadOptions, Volume, VolumeError, levels, sample};
+use crate::volume::{Access, Grid, ReadOptions, Volume, VolumeError, is_address, levels, sample};
 
 /// The number of bytes of values by which a camera is framed that fits the object: enough for its box, and quickly read.
 const FRAME_BYTES: u64 = 1 << 24;
@@ -26,14 +26,17 @@ impl Scene {
     /// and reading tell why.
     ///
     /// # Errors
-    /// If the volume by which the camera is placed cannot be read, or if no level fits in memory.
+    /// If the volume by which the camera is placed cannot be read, if no level fits in memory, or if a store at an address cannot be opened.
     pub fn choose_levels(
         &self,
         options: &ReadOptions,
         explicit: impl Fn(&Self, &Volume) -> Self,
     ) -> Result<Self, VolumeError> {
-        let open = open_channels(self, options);
-        if open.is_empty() || options.level.is_some() || self.check().is_err() {
+        if options.level.is_some() || self.check().is_err() {
+            return Ok(self.clone());
+        }
+        let open = open_channels(self, options)?;
+        if open.is_empty() {
             return Ok(self.clone());
         }
         let camera = if self.camera.needs_object() {
@@ -106,23 +109,32 @@ fn pixel_at_nearest(camera: &Camera, finest: &Grid, height: u32) -> f64 {
 }
 
 /// The channels that leave open which of several levels is read. Of a volume with a file of labels, only levels count that the labels have too.
-fn open_channels(scene: &Scene, options: &ReadOptions) -> Vec<Open> {
-    let Ok(access) = Access::new(options) else { return Vec::new() };
-    let of_file = |path: &Path| levels(path, &access).unwrap_or_default();
-    let open = |(number, channel): (usize, std::borrow::Cow<'_, super::Channel>)| {
-        let (VolumeSource::File(path), None) = (&channel.volume, channel.level) else { return None };
-        let mut grids = of_file(path);
+///
+/// # Errors
+/// If a store at an address cannot be opened: to ask again would take as long.
+fn open_channels(scene: &Scene, options: &ReadOptions) -> Result<Vec<Open>, VolumeError> {
+    let Ok(access) = Access::new(options) else { return Ok(Vec::new()) };
+    let of_file = |path: &Path| match levels(path, &access) {
+        Err(error) if is_address(path) => Err(error),
+        levels => Ok(levels.unwrap_or_default()),
+    };
+    let mut open = Vec::new();
+    for (number, channel) in scene.channels().enumerate() {
+        let (VolumeSource::File(path), None) = (&channel.volume, channel.level) else { continue };
+        let mut grids = of_file(path)?;
         if let Some(labels) = &channel.labels {
-            let labels = of_file(labels);
+            let labels = of_file(labels)?;
             let of_both = grids.iter().zip(&labels).take_while(|(grid, labels)| grid.dims == labels.dims).count();
             grids.truncate(of_both);
         }
         if let Some(spacing) = channel.spacing {
             grids = grids.into_iter().map(|grid| grid.with_finest_spacing(spacing)).collect();
         }
-        (grids.len() > 1).then_some((number, grids))
-    };
-    scene.channels().enumerate().filter_map(open).collect()
+        if grids.len() > 1 {
+            open.push((number, grids));
+        }
+    }
+    Ok(open)
 }
 
 /// The scene's volume at coarse levels, from which the camera's frame is taken: of each open channel the finest level within a few bytes, or else the

@@ -18,7 +18,7 @@ use crate::settings::economies::{Economies, KEYS};
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{FALLOFF, RADIUS, SLAB_WIDTH, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp};
-use crate::volume::{RawLayout, SPACING, SampleType, check_spacing};
+use crate::volume::{RawLayout, SPACING, SampleType, check_spacing, written_in};
 
 /// The tables of one channel.
 pub(super) struct ChannelTables<'a> {
@@ -125,8 +125,9 @@ fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> R
     section.read("path", &mut path, |entry| entry.text("a volume file's path").map(Some))?;
     section.read("builtin", &mut builtin, |entry| entry.text("a builtin volume's name").map(Some))?;
     section.read("spacing", &mut spacing, |entry| entry.numbers(SPACING).map(|s| Some(DVec3::from_array(s))))?;
-    section
-        .read("labels", &mut labels, |entry| entry.text("a label file's path").map(|path| Some(folder.join(path))))?;
+    section.read("labels", &mut labels, |entry| {
+        entry.text("a label file's path").map(|path| Some(written_in(folder, &path)))
+    })?;
     let (mut index, mut time, mut level) = (None, None, None);
     section.read("index", &mut index, |entry| entry.count().map(Some))?;
     section.read("time", &mut time, |entry| entry.count().map(Some))?;
@@ -139,7 +140,7 @@ fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> R
     }
     let refused = |found| origins.invalid(&key, &[], found, format!("either {key}.path or {key}.builtin"));
     let source = match (path, builtin) {
-        (Some(path), None) => VolumeSource::File(folder.join(path)),
+        (Some(path), None) => VolumeSource::File(written_in(folder, &path)),
         (None, Some(name)) => VolumeSource::Builtin(name),
         (None, None) => given.ok_or_else(|| refused("neither path nor builtin"))?,
         (Some(_), Some(_)) => return Err(refused("both path and builtin")),

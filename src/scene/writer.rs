@@ -17,7 +17,7 @@ use crate::settings::economies::Economies;
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::Ramp;
-use crate::volume::RawLayout;
+use crate::volume::{RawLayout, is_address};
 
 /// The maximum number of control points written on one line.
 const ON_ONE_LINE: usize = 3;
@@ -258,9 +258,9 @@ fn write_splatting(text: &mut Text, splatting: &Splatting) {
     text.line("resolution", resolution);
 }
 
-/// A file's path: unchanged if absolute, or else relative to a folder.
+/// A file's path: unchanged if absolute or an address, or else relative to a folder.
 fn within(folder: &Path, path: &Path, key: &str) -> Result<String, SceneError> {
-    let found = if path.is_absolute() { path.to_owned() } else { relative(folder, path) };
+    let found = if path.is_absolute() || is_address(path) { path.to_owned() } else { relative(folder, path) };
     found.to_str().map(str::to_owned).ok_or_else(|| invalid(key, found.display().to_string(), "a path in UTF-8"))
 }
 

@@ -9,6 +9,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::VolumeError;
+use super::address;
 use super::file::Files;
 use super::memory;
 use super::seek::{Located, Notes};
@@ -189,6 +190,19 @@ impl Access {
     /// The files in memory that are read instead of the disk's.
     pub(super) fn given(&self) -> Option<&Files> {
         self.0.given.as_ref()
+    }
+
+    /// Whether a path is the address of a store that is read over HTTP.
+    ///
+    /// # Errors
+    /// If it is, and reading is confined to a folder.
+    pub(super) fn is_address(&self, path: &Path) -> Result<bool, VolumeError> {
+        if self.given().is_some() || !address::is_address(path) {
+            return Ok(false);
+        }
+        let Some(folder) = &self.0.folder else { return Ok(true) };
+        let allowed = format!("files within {}, to which reading is confined", folder.named.display());
+        Err(invalid(path, "file", "an address", allowed))
     }
 
     /// Whether a path is that of a folder.

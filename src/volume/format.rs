@@ -204,6 +204,9 @@ fn format_at<'a, T>(
     path: &Path,
     access: &Access,
 ) -> Result<Option<&'a Format<T>>, VolumeError> {
+    if access.is_address(path)? {
+        return Ok(formats.iter().find(|format| format.name == ZARR));
+    }
     let (file, _) = archive_and_inner(path);
     if access.is_folder(file)? {
         let is_store = is_zarr(file, access)?;

@@ -1,6 +1,7 @@
 //! Scalar volumes: dimensions, spacing and values, without any appearance.
 
 mod access;
+mod address;
 pub mod builtin;
 mod channels;
 mod coefficients;
@@ -61,6 +62,7 @@ use rayon::prelude::*;
 
 pub(crate) use access::Access;
 pub use access::ReadOptions;
+pub(crate) use address::{is_address, written_in};
 use coefficients::KeptCoefficients;
 pub use colors::Texel;
 pub use display::ChannelDisplay;

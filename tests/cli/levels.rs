@@ -9,7 +9,7 @@ fn two_levels() -> String {
 }
 
 /// A store of a ball with 96³ and 48³ voxels, the finer ones at a distance of 1, in chunks of 32³ bytes.
-fn write_pyramid(folder: &Folder) {
+pub(crate) fn write_pyramid(folder: &Folder) {
     let transformations = |scale: f64| {
         let shift = (scale - 1.0) / 2.0;
         format!(

@@ -12,6 +12,7 @@ mod compare;
 mod errors;
 mod extremes;
 mod files;
+mod http;
 mod info;
 mod inputs;
 mod levels;
@@ -21,6 +22,8 @@ mod outputs;
 mod parts;
 mod program;
 mod rasterizers;
+#[path = "../common/http.rs"]
+mod server;
 mod statistics;
 mod streaming;
 mod sweep;

@@ -9,6 +9,8 @@ mod data_files;
 mod dicom;
 mod dispatch;
 mod holes;
+#[cfg(feature = "http")]
+mod http;
 mod memory;
 mod metaimage;
 mod mgh;
@@ -20,6 +22,9 @@ mod raw;
 mod reading;
 #[path = "../common/refused.rs"]
 mod refused;
+#[cfg(feature = "http")]
+#[path = "../common/http.rs"]
+mod server;
 mod several;
 #[path = "../common/shared.rs"]
 mod shared;

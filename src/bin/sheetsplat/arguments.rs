@@ -21,7 +21,7 @@ use crate::reading::Reading;
 /// The scene to draw, and the adapter.
 #[derive(clap::Args)]
 pub(crate) struct Input {
-    /// A scene file (.toml), a volume file, or builtin:NAME[:N].
+    /// A scene file (.toml), a volume file, the address of a Zarr store (http:// or https://), or builtin:NAME[:N].
     #[arg(value_name = "INPUT")]
     pub(crate) name: String,
     /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.

@@ -286,8 +286,7 @@ impl ZarrArray {
     /// The bytes of the chunk at a place, encoded; `None` if the store does not hold it.
     fn encoded(&self, key: &str, place: Sizes) -> Result<Option<Vec<u8>>, VolumeError> {
         let Some(shards) = &self.shards else {
-            let bytes = self.keys.bytes(key)?;
-            return bytes.map(|bytes| self.keys.range(key, 0..bytes)).transpose();
+            return self.keys.whole(key);
         };
         let range = shards.range(&self.keys, key, &self.axes.unsort(place));
         let Some(range) = range.map_err(|error| self.damaged(key, place, &error))? else { return Ok(None) };

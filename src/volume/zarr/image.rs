@@ -85,7 +85,9 @@ impl Image {
     /// Opens the image of a folder or of an archive, as in `file.ozx` and `file.ozx:labels/cells`.
     pub(super) fn open(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let (store, inner) = archive_and_inner(path);
-        let keys = if access.is_folder(store)? {
+        let keys = if access.is_address(path)? {
+            Keys::of_address(path, access)?
+        } else if access.is_folder(store)? {
             Keys::of_folder(path, access)
         } else {
             Keys::of_archive(store, inner.unwrap_or_default(), access)?

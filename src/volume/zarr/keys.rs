@@ -1,4 +1,4 @@
-//! The keys of a Zarr store and their bytes: files in a folder on disk or in memory, or in a ZIP archive.
+//! The keys of a Zarr store and their bytes: files in a folder on disk, in memory or at an address, or in a ZIP archive.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Debug, Formatter};
@@ -12,10 +12,12 @@ use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::source::{MAX_HEADER, Source, invalid, io_error};
 use super::super::zip::{Directory, Member};
+#[cfg(feature = "http")]
+use super::http::Http;
 
 /// A store's keys.
 pub(super) struct Keys {
-    /// The folder or the archive.
+    /// The folder, the archive or the address.
     pub(super) path: PathBuf,
     place: Place,
     access: Access,
@@ -29,6 +31,8 @@ enum Place {
     Folder,
     /// An archive's files by their names, and what the names of the store's keys begin with.
     Archive(BTreeMap<String, Member>, String),
+    #[cfg(feature = "http")]
+    Address(Http),
 }
 
 impl Debug for Keys {
@@ -53,6 +57,18 @@ impl Keys {
         Ok(Self::new(path, Place::Archive(members, prefix), access))
     }
 
+    /// The keys of a store at an address.
+    #[cfg(feature = "http")]
+    pub(super) fn of_address(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        Ok(Self::new(path, Place::Address(Http::new(path)?), access))
+    }
+
+    /// The error for a store at an address.
+    #[cfg(not(feature = "http"))]
+    pub(super) fn of_address(path: &Path, _: &Access) -> Result<Self, VolumeError> {
+        Err(invalid(path, "format", "an address, which needs the feature `http`", "a folder or an archive"))
+    }
+
     fn new(path: &Path, place: Place, access: &Access) -> Self {
         let (read, limit) = (AtomicU64::new(0), AtomicU64::new(MAX_HEADER));
         Self { path: path.to_owned(), place, access: access.clone(), read, limit }
@@ -70,11 +86,19 @@ impl Keys {
 
     /// The place of a key, for errors.
     pub(super) fn file(&self, key: &str) -> PathBuf {
-        self.path.join(key)
+        match &self.place {
+            Place::Folder | Place::Archive(..) => self.path.join(key),
+            #[cfg(feature = "http")]
+            Place::Address(http) => http.place(key),
+        }
     }
 
     /// A file of metadata; `None` if the store has none with this name.
     pub(super) fn metadata(&self, key: &str) -> Result<Option<Vec<u8>>, VolumeError> {
+        #[cfg(feature = "http")]
+        if let Place::Address(http) = &self.place {
+            return http.whole(key, MAX_HEADER);
+        }
         let Some(bytes) = self.bytes(key)? else { return Ok(None) };
         if bytes > MAX_HEADER {
             let found = format!("{bytes} bytes");
@@ -92,7 +116,22 @@ impl Keys {
         match &self.place {
             Place::Folder => self.open(key)?.map(|mut file| file.left()).transpose(),
             Place::Archive(members, prefix) => Ok(members.get(&format!("{prefix}{key}")).map(|member| member.bytes)),
+            #[cfg(feature = "http")]
+            Place::Address(http) => http.length(key),
         }
+    }
+
+    /// All bytes of a key; `None` if the store has no such key.
+    pub(super) fn whole(&self, key: &str) -> Result<Option<Vec<u8>>, VolumeError> {
+        #[cfg(feature = "http")]
+        if let Place::Address(http) = &self.place {
+            // The length need not be asked for first.
+            let bytes = http.whole(key, self.limit.load(Ordering::Relaxed))?;
+            self.read.fetch_add(bytes.as_ref().map_or(0, |bytes| bytes.len() as u64), Ordering::Relaxed);
+            return Ok(bytes);
+        }
+        let bytes = self.bytes(key)?;
+        bytes.map(|bytes| self.range(key, 0..bytes)).transpose()
     }
 
     /// Some bytes of a key that exists.
@@ -119,6 +158,10 @@ impl Keys {
                 let member = members.get(&format!("{prefix}{key}")).ok_or_else(missing)?;
                 member.bytes(self.access.open_to_look(&self.path)?, range)
             }
+            #[cfg(feature = "http")]
+            Place::Address(_) if range.is_empty() => Ok(Vec::new()),
+            #[cfg(feature = "http")]
+            Place::Address(http) => http.range(key, &range)?.ok_or_else(missing),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Zarr stores (versions 2 and 3): OME-Zarr 0.4 and 0.5 images with their levels and labels, and plain arrays.
 //!
-//! A store is a folder, or a ZIP archive of one (`.zip`, `.ozx`). zarrs opens arrays and takes shards and chunks apart; which bytes are read and how much
+//! A store is a folder, on disk or at an address, or a ZIP archive of one (`.zip`, `.ozx`). zarrs opens arrays and takes shards and chunks apart; which bytes are read and how much
 //! they may expand to is decided here, in `keys` and `codec`.
 
 mod array;
@@ -9,6 +9,8 @@ mod blosc;
 mod codec;
 mod display;
 mod half;
+#[cfg(feature = "http")]
+mod http;
 mod image;
 mod json;
 mod keys;

@@ -1,0 +1,328 @@
+//! A store's keys fetched by HTTP: a GET of a value, or of a range of its bytes (<https://www.rfc-editor.org/rfc/rfc9110#name-range-requests>).
+
+use std::collections::HashMap;
+use std::fmt::Write;
+use std::io::Read;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+use std::thread::sleep;
+use std::time::Duration;
+
+use ureq::http::Response;
+use ureq::http::header::{ACCEPT_ENCODING, CONTENT_RANGE, RANGE};
+use ureq::{Agent, Body, Error};
+
+use super::super::VolumeError;
+use super::super::source::{invalid, io_error};
+
+/// The maximum number of redirects that a request follows.
+const MAX_REDIRECTS: u32 = 5;
+
+/// How often a request is sent at most: servers of many are busy at times.
+const ATTEMPTS: u32 = 3;
+
+/// The time before a request is sent again; before each further one it is four times as long.
+const PAUSE: Duration = Duration::from_millis(200);
+
+/// The longest time in which a server sends nothing, and that for a whole request.
+const TIME_LIMITS: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(300)];
+
+/// The number of connections that are kept for further requests.
+const CONNECTIONS: usize = 16;
+
+/// The maximum number of lengths that are kept.
+const MAX_LENGTHS: usize = 1 << 20;
+
+/// A store at an address.
+pub(super) struct Http {
+    agent: Agent,
+    /// The address up to the keys, without a slash at its end.
+    root: String,
+    /// What follows the keys: a question mark and a query, or nothing.
+    query: String,
+    time_limit: Duration,
+    /// The lengths of values that are known; `None` for keys that the store does not hold.
+    lengths: Mutex<HashMap<String, Option<u64>>>,
+}
+
+/// Why a request failed.
+enum Failure {
+    /// The next attempt may succeed.
+    Passing(VolumeError),
+    Lasting(VolumeError),
+}
+
+impl From<VolumeError> for Failure {
+    fn from(error: VolumeError) -> Self {
+        Self::Lasting(error)
+    }
+}
+
+impl Http {
+    /// The store at an address.
+    pub(super) fn new(address: &Path) -> Result<Self, VolumeError> {
+        Self::within(address, TIME_LIMITS)
+    }
+
+    fn within(address: &Path, [silence, whole]: [Duration; 2]) -> Result<Self, VolumeError> {
+        let allowed = "an address without #, in UTF-8";
+        let text = address.to_str().filter(|text| !text.contains('#'));
+        let text = text.ok_or_else(|| invalid(address, "address", "another one", allowed))?;
+        let (root, query) =
+            text.split_once('?').map_or((text, String::new()), |(root, query)| (root, format!("?{query}")));
+        let config = Agent::config_builder()
+            .http_status_as_error(false)
+            // What is asked for in secret must not be answered in the open. No other scheme is known to the client.
+            .https_only(text.get(..6).is_some_and(|scheme| scheme.eq_ignore_ascii_case("https:")))
+            .max_redirects(MAX_REDIRECTS)
+            .timeout_global(Some(whole))
+            .timeout_per_read(Some(silence))
+            .timeout_connect(Some(silence))
+            .max_idle_connections(CONNECTIONS)
+            .max_idle_connections_per_host(CONNECTIONS)
+            .user_agent(concat!("sheetsplat/", env!("CARGO_PKG_VERSION")))
+            .build();
+        let (agent, lengths) = (Agent::new_with_config(config), Mutex::default());
+        Ok(Self { agent, root: root.trim_end_matches('/').to_owned(), query, time_limit: silence, lengths })
+    }
+
+    /// The place of a key, for errors: without the query, which may be a secret.
+    pub(super) fn place(&self, key: &str) -> PathBuf {
+        PathBuf::from(format!("{}/{key}", self.root))
+    }
+
+    /// The length of a key's value; `None` if the store has no such key.
+    pub(super) fn length(&self, key: &str) -> Result<Option<u64>, VolumeError> {
+        let lengths = || self.lengths.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(length) = lengths().get(key) {
+            return Ok(*length);
+        }
+        let length = self.repeated(|| {
+            let Some(mut response) = self.get(key, Some(0..1))? else { return Ok(None) };
+            if response.status() == 200 {
+                // The whole value follows, of which nothing is read.
+                let length = response.body().content_length();
+                let none = || invalid(&self.place(key), "Content-Length", "none", "the number of bytes").into();
+                return length.ok_or_else(none).map(Some);
+            }
+            let length = self.content_range(key, &response)?.1;
+            if length > 0 {
+                // The connection can then be used again.
+                self.read(key, &mut response, 1)?;
+            }
+            Ok(Some(length))
+        })?;
+        let mut lengths = lengths();
+        if lengths.len() >= MAX_LENGTHS {
+            lengths.clear();
+        }
+        lengths.insert(key.to_owned(), length);
+        Ok(length)
+    }
+
+    /// A key's value, which may have at most `limit` bytes; `None` if the store has no such key.
+    pub(super) fn whole(&self, key: &str, limit: u64) -> Result<Option<Vec<u8>>, VolumeError> {
+        self.repeated(|| {
+            let Some(mut response) = self.get(key, None)? else { return Ok(None) };
+            let too_long = |found: String| invalid(&self.place(key), "chunk", found, format!("at most {limit} bytes"));
+            let length = response.body().content_length();
+            if let Some(length) = length.filter(|&length| length > limit) {
+                return Err(too_long(format!("{length} bytes")).into());
+            }
+            let bytes = self.read(key, &mut response, length.unwrap_or(limit))?;
+            match length {
+                _ if bytes.len() as u64 > limit => Err(too_long("more".to_owned()).into()),
+                Some(length) if length != bytes.len() as u64 => Err(self.mismatch(key, bytes.len(), length)),
+                _ => Ok(Some(bytes)),
+            }
+        })
+    }
+
+    /// Some bytes, at least one, of a key's value; `None` if the store has no such key.
+    pub(super) fn range(&self, key: &str, range: &Range<u64>) -> Result<Option<Vec<u8>>, VolumeError> {
+        self.repeated(|| {
+            let Some(mut response) = self.get(key, Some(range.clone()))? else { return Ok(None) };
+            let count = range.end - range.start;
+            let first = match response.status().as_u16() {
+                206 => self.content_range(key, &response)?.0,
+                416 => return Err(self.mismatch(key, 0, count)),
+                _ => 0,
+            };
+            if first != range.start {
+                let found = format!("bytes from {first}");
+                let allowed = format!("bytes from {}, by a server that answers requests for ranges", range.start);
+                return Err(invalid(&self.place(key), "range", found, allowed).into());
+            }
+            let mut bytes = self.read(key, &mut response, count)?;
+            if response.status() == 200 {
+                bytes.truncate(count as usize);
+            }
+            if bytes.len() as u64 == count { Ok(Some(bytes)) } else { Err(self.mismatch(key, bytes.len(), count)) }
+        })
+    }
+
+    /// Sends a request until it succeeds or fails for good.
+    fn repeated<T>(&self, request: impl Fn() -> Result<T, Failure>) -> Result<T, VolumeError> {
+        let mut pause = PAUSE;
+        for _ in 1..ATTEMPTS {
+            match request() {
+                Ok(answer) => return Ok(answer),
+                Err(Failure::Lasting(error)) => return Err(error),
+                Err(Failure::Passing(error)) => log::info!("asked again after {pause:?}: {error}"),
+            }
+            sleep(pause);
+            pause *= 4;
+        }
+        request().map_err(|failure| match failure {
+            Failure::Passing(error) | Failure::Lasting(error) => error,
+        })
+    }
+
+    /// Requests a key's value, or a range of it; `None` if the store has no such key.
+    fn get(&self, key: &str, range: Option<Range<u64>>) -> Result<Option<Response<Body>>, Failure> {
+        let address = format!("{}/{}{}", self.root, encoded(key), self.query);
+        // Bytes are counted as they are stored.
+        let mut request = self.agent.get(address).header(ACCEPT_ENCODING, "identity");
+        let is_range = range.is_some();
+        if let Some(range) = range {
+            request = request.header(RANGE, format!("bytes={}-{}", range.start, range.end - 1));
+        }
+        let response = request.call().map_err(|error| self.failure(key, error))?;
+        let status = response.status().as_u16();
+        match status {
+            200 => Ok(Some(response)),
+            // An empty value has no range.
+            206 | 416 if is_range => Ok(Some(response)),
+            // Stores of objects forbid to list them, and so to tell that there is none.
+            403 | 404 | 410 => Ok(None),
+            _ => {
+                let allowed = "200 or 206, or 404 or 403 for a key that the store does not hold";
+                let error = invalid(&self.place(key), "status", status, allowed);
+                let is_passing = status == 429 || status >= 500;
+                Err(if is_passing { Failure::Passing(error) } else { Failure::Lasting(error) })
+            }
+        }
+    }
+
+    /// Where a partial answer begins, and the length of the whole value.
+    fn content_range<T>(&self, key: &str, response: &Response<T>) -> Result<(u64, u64), VolumeError> {
+        let text = response.headers().get(CONTENT_RANGE).and_then(|value| value.to_str().ok()).unwrap_or("none");
+        let parse = || {
+            let (range, length) = text.strip_prefix("bytes ")?.split_once('/')?;
+            let first = if range == "*" { 0 } else { range.split_once('-')?.0.parse().ok()? };
+            Some((first, length.parse().ok()?))
+        };
+        parse().ok_or_else(|| invalid(&self.place(key), "Content-Range", text, "bytes FIRST-LAST/LENGTH"))
+    }
+
+    /// Reads `count` bytes, and one more if there is one: at the end of an answer its connection can be used again.
+    fn read(&self, key: &str, response: &mut Response<Body>, count: u64) -> Result<Vec<u8>, Failure> {
+        let mut bytes = Vec::new();
+        let reader = response.body_mut().as_reader();
+        match reader.take(count.saturating_add(1)).read_to_end(&mut bytes) {
+            Ok(_) => Ok(bytes),
+            // ureq's own errors pass through the reader.
+            Err(error) => Err(self.failure(key, Error::from(error))),
+        }
+    }
+
+    /// The error for an answer of another length than expected.
+    fn mismatch(&self, key: &str, found: usize, expected: u64) -> Failure {
+        Failure::Passing(invalid(&self.place(key), "chunk", format!("{found} bytes"), format!("{expected} bytes")))
+    }
+
+    /// The error for a request without an answer.
+    fn failure(&self, key: &str, error: Error) -> Failure {
+        let place = self.place(key);
+        match error {
+            Error::Timeout(_) => {
+                let found = format!("no answer in time ({error})");
+                let allowed = format!("an answer that stops for at most {:?}", self.time_limit);
+                Failure::Lasting(invalid(&place, "address", found, allowed))
+            }
+            Error::TooManyRedirects | Error::RedirectFailed | Error::BadUri(_) | Error::RequireHttpsOnly(_) => {
+                let allowed = format!(
+                    "at most {MAX_REDIRECTS} redirects, to addresses http:// or https://, from https:// to https:// alone"
+                );
+                Failure::Lasting(invalid(&place, "address", error, allowed))
+            }
+            Error::Io(error) => Failure::Passing(io_error(&place)(error)),
+            Error::ConnectionFailed | Error::HostNotFound => {
+                Failure::Passing(invalid(&place, "address", error, "a server that can be reached"))
+            }
+            error => Failure::Lasting(invalid(&place, "address", error, "an answer by HTTP")),
+        }
+    }
+}
+
+/// A key as it stands in an address: bytes that have no place in one are encoded.
+fn encoded(key: &str) -> String {
+    let mut text = String::new();
+    for byte in key.bytes() {
+        if byte.is_ascii_alphanumeric() || b"/-._~!$&'()*+,;=:@".contains(&byte) {
+            text.push(byte.into());
+        } else {
+            // Text takes whatever is written.
+            _ = write!(text, "%{byte:02X}");
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use std::io::Write;
+    use std::net::TcpListener;
+    use std::thread::spawn;
+    use std::time::Instant;
+
+    use super::*;
+
+    #[test]
+    fn servers_that_do_not_answer_are_left() {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = format!("http://{}/store", listener.local_addr().unwrap());
+        // One connection is never answered, one stops in its value, and one sends a byte now and then.
+        spawn(move || {
+            let mut connections = Vec::new();
+            for (number, connection) in listener.incoming().enumerate() {
+                let mut connection = connection.unwrap();
+                if number > 0 {
+                    connection.write_all(b"HTTP/1.1 200 OK\r\nContent-Length: 100\r\n\r\nabc").unwrap();
+                }
+                if number > 1 {
+                    spawn(move || {
+                        while connection.write_all(b"a").is_ok() {
+                            sleep(Duration::from_millis(50));
+                        }
+                    });
+                } else {
+                    connections.push(connection);
+                }
+            }
+        });
+        let limits = [Duration::from_millis(300), Duration::from_millis(1500)];
+        let store = Http::within(Path::new(&address), limits).unwrap();
+        for longest in [1000, 1000, 3000] {
+            let start = Instant::now();
+            let message = store.whole("zarr.json", 1000).unwrap_err().to_string();
+            assert!(
+                message.starts_with(&format!("{address}/zarr.json: address: found no answer in time")),
+                "{message}"
+            );
+            assert!(message.ends_with("allowed: an answer that stops for at most 300ms"), "{message}");
+            assert!(start.elapsed() < Duration::from_millis(longest), "{:?}", start.elapsed());
+        }
+    }
+
+    #[test]
+    fn keys_are_encoded_before_a_query() {
+        let store = Http::new(Path::new("https://a/b.zarr/?sig=c%20d")).unwrap();
+        assert_eq!(store.place("0/c/1").to_str(), Some("https://a/b.zarr/0/c/1"));
+        assert_eq!((store.root.as_str(), store.query.as_str()), ("https://a/b.zarr", "?sig=c%20d"));
+        assert_eq!(encoded("a b/ü?#%.zarray"), "a%20b/%C3%BC%3F%23%25.zarray");
+        assert!(Http::new(Path::new("http://a/b#c")).is_err());
+    }
+}
