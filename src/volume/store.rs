@@ -22,7 +22,7 @@ pub trait Store: Send + Sync + Debug {
     fn levels(&self) -> &[StoreLevel];
 
     /// Reads the values of a box of voxels of a level, x fastest: `values.len()` is the product of `dims`. A value that is not finite makes a hole. Returns
-    /// the number of bytes read from the store (compressed); where threads read at once, one may return what another has read, but their sum is exact.
+    /// the number of bytes of chunks that were read (compressed).
     ///
     /// # Errors
     /// If the box does not lie in the level, or the store cannot be read or is damaged there. The error names the chunk. `values` may then hold anything.

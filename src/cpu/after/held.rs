@@ -75,20 +75,31 @@ impl Frame<'_> {
             let reach = reach.ceil().min(extent.dims.as_dvec3()).as_uvec3();
             (low.saturating_sub(reach), (low + dims + reach).min(extent.dims))
         };
-        let is_seen = |chunk: (UVec3, UVec3)| {
+        let nothing = |slabs, extent| {
+            let volume = Volume::piece(Grid { dims: UVec3::ZERO, ..self.grid }, Vec::new());
+            Some(Held { slabs, extent, volume, cells: None, is_blank: true })
+        };
+        // Holes only have no value, and so no opacity.
+        let is_dark = |[min, max]: [f32; 2]| shown.is_some() && (min > max || blank(&[min, max]));
+        if stream.range((extent.low, extent.held)).is_some_and(is_dark) {
+            return nothing(slabs, extent);
+        }
+        let is_seen = |number: u32, chunk: (UVec3, UVec3)| {
             let (on_screen, within) = self.placement.bounds(around(chunk, half_box + RIM));
             let is_there = within.start < slabs.end && slabs.start < within.end;
             if !(is_there && pixels_of(origin, on_screen).is_some_and(|pixels| open.sees(&pixels))) {
                 return false;
             }
             // As bricks in memory are left out: no value between those within two kernels and a slab may have an opacity.
+            if stream.is_unread(number) {
+                return true;
+            }
             let (low, end) = around(chunk, half_box * 2.0 + self.placement.slab_step() + RIM);
-            !stream.range((low, end - low)).is_some_and(|range| blank(&range))
+            !stream.range((low, end - low)).is_some_and(is_dark)
         };
         let seen = stream.seen((extent.low, extent.held), is_seen);
         if seen.is_empty() && shown.is_some() {
-            let nothing = Volume::piece(Grid { dims: UVec3::ZERO, ..self.grid }, Vec::new());
-            return Some(Held { slabs, extent, volume: nothing, cells: None, is_blank: true });
+            return nothing(slabs, extent);
         }
         let values = stream.values((extent.low, extent.held), &seen);
         let is_blank = blank(&values);

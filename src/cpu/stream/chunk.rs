@@ -47,6 +47,7 @@ impl Chunk {
         let (values, read) = match source.is_stored(number)? || source.shows_fill() {
             true => {
                 let (values, read) = source.values(low, dims)?;
+                source.note(number, &values);
                 (Some(Volume::piece(Grid { dims, ..source.grid }, values)), read)
             }
             false => (None, 0),

@@ -4,6 +4,7 @@
 
 mod chunk;
 mod pool;
+mod ranges;
 mod renderer;
 mod source;
 
@@ -18,6 +19,7 @@ use crate::lists::quad_plan::Overlaps;
 use crate::volume::Grid;
 pub(super) use chunk::Chunk;
 use pool::Pool;
+use ranges::{EMPTY, union};
 pub use renderer::{StreamError, StreamRenderer};
 use source::Source;
 
@@ -28,6 +30,8 @@ pub(super) struct Stream {
     pool: Pool,
     /// Threads that only read. Those that draw wait for them, and must not draw another tile meanwhile, which might wait for the first.
     readers: ThreadPool,
+    /// The number of chunks that a tile lets be read at once.
+    ahead: usize,
 }
 
 impl Stream {
@@ -46,22 +50,29 @@ impl Stream {
         self.source.bounds(number)
     }
 
-    /// The chunks that share voxels with a box, given by its first voxel and its voxels along each axis, and that, given alike, `is_seen` holds of.
-    pub(super) fn seen(&self, (low, dims): (UVec3, UVec3), is_seen: impl Fn((UVec3, UVec3)) -> bool) -> Vec<u32> {
-        let side = self.source.side;
-        let (first, last) = (low / side, (low + dims - 1) / side);
-        let columns = |y, z| (first.x..=last.x).map(move |x| UVec3::new(x, y, z) * side);
-        let chunks = (first.z..=last.z).flat_map(|z| (first.y..=last.y).flat_map(move |y| columns(y, z)));
-        let numbers = chunks.map(|voxel| self.source.number_of(voxel));
-        numbers.filter(|&number| is_seen(self.bounds(number))).collect()
+    /// The chunks that share voxels with a box, given by its first voxel and its voxels along each axis, and that `is_seen` holds of, which gets a chunk's
+    /// number and its box.
+    pub(super) fn seen(&self, within: (UVec3, UVec3), is_seen: impl Fn(u32, (UVec3, UVec3)) -> bool) -> Vec<u32> {
+        self.chunks_in(within).filter(|&number| is_seen(number, self.bounds(number))).collect()
     }
 
-    /// The minimum and maximum of the values in the chunks that share voxels with a box, if the store knows them.
+    /// The minimum and maximum of the values in the chunks that share voxels with a box, as far as they are known.
     pub(super) fn range(&self, within: (UVec3, UVec3)) -> Option<[f32; 2]> {
-        let mut chunks = self.seen(within, |_| true).into_iter();
-        chunks.try_fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], number| {
-            self.source.range(number).map(|range| [min.min(range[0]), max.max(range[1])])
-        })
+        self.chunks_in(within).try_fold(EMPTY, |all, number| Some(union(all, self.source.known_range(number)?)))
+    }
+
+    /// Whether nothing is known of a chunk's values but that the store holds them.
+    pub(super) fn is_unread(&self, number: u32) -> bool {
+        self.source.range(number).is_none()
+    }
+
+    /// The chunks that share voxels with a box.
+    fn chunks_in(&self, (low, dims): (UVec3, UVec3)) -> impl Iterator<Item = u32> {
+        let (side, across) = (self.source.side, self.source.across());
+        let (first, last) = (low / side, (low + dims - 1) / side);
+        let number = move |x, y, z| x + across.x * (y + across.y * z);
+        let row = move |y, z| (first.x..=last.x).map(move |x| number(x, y, z));
+        (first.z..=last.z).flat_map(move |z| (first.y..=last.y).flat_map(move |y| row(y, z)))
     }
 
     /// The values of a box from some of the chunks; NaN from others.
@@ -69,8 +80,8 @@ impl Stream {
         let store = &self.source.store;
         let mut values = vec![f32::NAN; dims.element_product() as usize];
         for (at, &number) in seen.iter().enumerate() {
-            // The next one is read meanwhile.
-            seen[at..].iter().take(2).for_each(|&number| self.request(number));
+            // The next ones are read meanwhile.
+            seen[at..].iter().take(self.ahead).for_each(|&number| self.request(number));
             let Some(chunk) = self.chunk(number) else { break };
             let (own, own_dims) = self.bounds(number);
             let (from, end) = (own.max(low), (own + own_dims).min(low + dims));

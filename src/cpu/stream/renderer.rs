@@ -8,6 +8,7 @@ use web_time::Instant;
 
 use super::Stream;
 use super::pool::{Pool, Reads};
+use super::ranges::Ranges;
 use super::source::{Source, Splats};
 use crate::after::normalization::{Normalization, range_of};
 use crate::cpu::after::{self, Matter};
@@ -27,7 +28,13 @@ use crate::settings::splatting::{Classification, Interpolation, Method};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
-use crate::volume::{Grid, Store, Volume, VolumeError};
+use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
+
+/// The minimum number of threads that read: a server, or a disk, answers several requests in the time of one.
+const LEAST_READERS: usize = 8;
+
+/// The maximum number of chunks that a tile lets be read at once.
+const MOST_AHEAD: u64 = 16;
 
 /// Bytes that boxes of voxels may take however little memory chunks may.
 const LEAST_HELD: usize = 64 << 20;
@@ -103,7 +110,7 @@ impl StreamRenderer {
         &self.scene
     }
 
-    /// Draws a frame on the threads of the current rayon pool, while as many others read. Neither their number nor the memory changes a bit of the
+    /// Draws a frame on the threads of the current rayon pool, while others read. Neither their number nor the memory changes a bit of the
     /// image. Of a volume classified after splatting voxels and sections are not counted.
     ///
     /// # Errors
@@ -169,15 +176,20 @@ impl StreamRenderer {
         let (splatting, grid) = (&scene.splatting, store.levels()[*level].grid);
         let slabs = window.with_lead(splatting.compositing, Classification::Before).slabs;
         let threads = rayon::current_num_threads();
-        let readers = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let readers = rayon::ThreadPoolBuilder::new().num_threads(threads.max(LEAST_READERS)).build();
         let readers =
             readers.map_err(|error| SettingError::new("threads", error.to_string(), "threads that can be started"))?;
+        let side = Source::side(store.levels()[*level].chunk, &grid);
+        let chunk_bytes = side.as_u64vec3().element_product().saturating_mul(4);
+        let ahead = self.memory as u64 / chunk_bytes / (2 * threads as u64);
         Ok(Stream {
+            ahead: ahead.clamp(2, MOST_AHEAD) as usize,
             source: Source {
                 store: Arc::clone(store),
                 level: *level,
                 grid,
-                side: Source::side(store.levels()[*level].chunk, &grid),
+                side,
+                ranges: Ranges::new(StoreLevel { grid, chunk: side }.chunks().element_product()),
                 splats: (splatting.classification == Classification::Before).then(|| Splats {
                     transfer: transfer.clone(),
                     clipped: scene.clip.voxels(&grid, splatting.radius),

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::UVec3;
 
+use super::ranges::{EMPTY, Known, Ranges, union};
 use crate::cpu::bin::{Placed, place_box};
 use crate::cpu::project::Projection;
 use crate::error::setting::SettingError;
@@ -16,6 +17,10 @@ use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
 /// The minimum number of voxels along each axis of a chunk that is drawn. Smaller chunks of the store are read together.
 const LEAST_SIDE: u32 = 32;
 
+/// The maximum number of chunks that are drawn, and of voxels in each.
+const MOST_CHUNKS: u128 = 1 << 24;
+const MOST_VOXELS: u128 = 1 << 30;
+
 /// A level of a store in a view.
 #[derive(Debug)]
 pub(super) struct Source {
@@ -24,6 +29,7 @@ pub(super) struct Source {
     pub(super) grid: Grid,
     /// The voxels of a chunk that is drawn: some of the store's, in whole bricks.
     pub(super) side: UVec3,
+    pub(super) ranges: Ranges,
     /// Where classification comes before splatting.
     pub(super) splats: Option<Splats>,
 }
@@ -56,22 +62,24 @@ impl Source {
         StoreLevel { grid: self.grid, chunk: self.side }.chunks()
     }
 
-    /// Checks that the chunks of a level can be numbered, and the voxels of each.
+    /// Checks that the chunks of a level, and the voxels of each, are no more than can be noted.
     ///
     /// # Errors
     /// If a chunk has no voxels, or there are more of either than numbers.
     pub(super) fn check(level: &StoreLevel) -> Result<(), SettingError> {
         let StoreLevel { grid, chunk } = level;
-        let fits = |sizes: UVec3| sizes.to_array().map(u128::from).iter().product::<u128>() <= u128::from(u32::MAX);
+        let count = |sizes: UVec3| sizes.to_array().map(u128::from).iter().product::<u128>();
         if chunk.min_element() > 0 {
             let side = Self::side(*chunk, grid);
             // With the voxels around a chunk.
-            if fits(StoreLevel { grid: *grid, chunk: side }.chunks()) && fits(side + 2) {
+            if count(StoreLevel { grid: *grid, chunk: side }.chunks()) <= MOST_CHUNKS && count(side + 2) <= MOST_VOXELS
+            {
                 return Ok(());
             }
         }
         let found = format!("chunks of {chunk} voxels in a level of {}", grid.dims);
-        Err(SettingError::new("volume", found, "at most 4294967295 chunks of at least 1 and at most 4294967295 voxels"))
+        let allowed = format!("at most {MOST_CHUNKS} chunks of at least 1 and at most {MOST_VOXELS} voxels");
+        Err(SettingError::new("volume", found, allowed))
     }
 
     /// The number of the chunk that holds a voxel.
@@ -93,7 +101,7 @@ impl Source {
         let Some(Splats { projection, support, transfer, .. }) = &self.splats else { return Vec::new() };
         let values = ValueSet::of_tables(&transfer.tables(None));
         let place = |number| {
-            let range = self.range(number);
+            let range = self.known_range(number);
             if range.is_some_and(|[min, max]| min > max || !values.meets(min, max)) {
                 return None;
             }
@@ -126,11 +134,34 @@ impl Source {
         (first.z..=last.z).flat_map(move |z| (first.y..=last.y).flat_map(move |y| columns(y, z)))
     }
 
-    /// The minimum and maximum of a chunk's values, if the store knows them.
-    pub(super) fn range(&self, number: u32) -> Option<[f32; 2]> {
+    /// The minimum and maximum of a chunk's values, if the store knows them, or they have been read.
+    pub(super) fn known_range(&self, number: u32) -> Option<[f32; 2]> {
+        if let Known::Range(range) = self.ranges.of(number) {
+            return Some(range);
+        }
         let of = |chunk| self.store.chunk_range(self.level, chunk);
-        let union = |a: [f32; 2], b: [f32; 2]| [a[0].min(b[0]), a[1].max(b[1])];
-        self.stored(self.bounds(number)).map(of).reduce(|a, b| Some(union(a?, b?))).flatten()
+        let range = self.stored(self.bounds(number)).map(of).reduce(|a, b| Some(union(a?, b?))).flatten();
+        range.inspect(|&range| self.ranges.set(number, Known::Range(range)))
+    }
+
+    /// As [`Self::known_range`], and of a chunk that the store does not hold.
+    pub(super) fn range(&self, number: u32) -> Option<[f32; 2]> {
+        let known = self.known_range(number);
+        if known.is_some() || self.ranges.of(number) == Known::Held {
+            return known;
+        }
+        // Reading a chunk tells why a store cannot be read.
+        let is_held = self.is_stored(number).unwrap_or(true);
+        let fill = self.store.fill();
+        let of_fill = if fill.is_finite() { [fill; 2] } else { EMPTY };
+        self.ranges.set(number, if is_held { Known::Held } else { Known::Range(of_fill) });
+        (!is_held).then_some(of_fill)
+    }
+
+    /// Notes the values of a chunk that has been read, with those around it.
+    pub(super) fn note(&self, number: u32, values: &[f32]) {
+        let range = values.iter().fold(EMPTY, |range, &value| union(range, [value; 2]));
+        self.ranges.set(number, Known::Range(range));
     }
 
     /// Whether the store holds any voxel of a chunk.

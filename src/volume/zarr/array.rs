@@ -54,6 +54,16 @@ impl Debug for ZarrArray {
     }
 }
 
+/// The values of a chunk that the store holds, and the number of its bytes there.
+type Decoded<T> = Option<(Vec<T>, u64)>;
+
+/// What a store holds of a region: chunks, and their bytes as they are stored.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Held {
+    pub(super) chunks: u64,
+    pub(super) bytes: u64,
+}
+
 /// A box in an array: some channels at one time.
 pub(super) struct Region {
     pub(super) channels: Range<u64>,
@@ -217,9 +227,9 @@ impl ZarrArray {
         rayon::current_num_threads().min(self.count(region) as usize)
     }
 
-    /// Reads a region that lies in the array, channel by channel, x fastest, into as many values. Returns the number of chunks that the store holds of
-    /// it.
-    pub(super) fn read<T: Voxel>(&self, region: &Region, values: &mut [T]) -> Result<u64, VolumeError> {
+    /// Reads a region that lies in the array, channel by channel, x fastest, into as many values. Returns what the store
+    /// holds of it.
+    pub(super) fn read<T: Voxel>(&self, region: &Region, values: &mut [T]) -> Result<Held, VolumeError> {
         debug_assert_eq!(values.len(), region.count());
         let [low, counts] = self.chunks(region);
         let total = self.count(region);
@@ -232,16 +242,17 @@ impl ZarrArray {
             }
             place
         };
-        let (mut next, mut held) = (0, 0);
+        let (mut next, mut held) = (0, Held::default());
         while next < total {
             let batch = next..total.min(next + at_once);
             next = batch.end;
             let decode = |index| Ok((place(index), self.decode(place(index))?));
-            let decoded: Vec<(Sizes, Option<Vec<T>>)> =
+            let decoded: Vec<(Sizes, Decoded<T>)> =
                 batch.into_par_iter().map(decode).collect::<Result<_, VolumeError>>()?;
             for (place, chunk) in decoded {
-                held += u64::from(chunk.is_some());
-                let chunk = chunk.map_or_else(|| self.filled(place), Ok)?;
+                held.chunks += u64::from(chunk.is_some());
+                held.bytes += chunk.as_ref().map_or(0, |(_, bytes)| *bytes);
+                let chunk = chunk.map_or_else(|| self.filled(place), |(chunk, _)| Ok(chunk))?;
                 self.copy(place, &chunk, region, values);
             }
         }
@@ -260,12 +271,14 @@ impl ZarrArray {
         invalid(&self.keys.file(key), "data", format!("{sample} in the chunk"), T::ALLOWED)
     }
 
-    /// Decodes the chunk at a place of the grid of chunks, if the store holds it; values are in the order of the array's axes.
-    fn decode<T: Voxel>(&self, place: Sizes) -> Result<Option<Vec<T>>, VolumeError> {
+    /// Decodes the chunk at a place of the grid of chunks, if the store holds it; values are in the order of the array's axes. Also returns the number of
+    /// its bytes in the store.
+    fn decode<T: Voxel>(&self, place: Sizes) -> Result<Decoded<T>, VolumeError> {
         let key = self.key(place);
         let (data_type, fill) = (self.array.data_type(), self.array.fill_value());
         let damaged = |error: &dyn Display| self.damaged(&key, place, error);
         let Some(code) = self.encoded(&key, place)? else { return Ok(None) };
+        let length = code.len() as u64;
         let (code, options) = (Cow::Owned(code), CodecOptions::default().with_concurrent_target(1));
         let decoded = match &self.shards {
             Some(Shards { codecs, chunk, .. }) => codecs.decode(code, chunk, data_type, fill, &options),
@@ -280,7 +293,8 @@ impl ZarrArray {
         if bytes.len() as u64 != expected {
             return Err(damaged(&format!("{} bytes of {expected}", bytes.len())));
         }
-        self.convert(&bytes).map(Some).map_err(|sample| self.refused::<T>(&key, sample))
+        let values = self.convert(&bytes).map_err(|sample| self.refused::<T>(&key, sample))?;
+        Ok(Some((values, length)))
     }
 
     /// The bytes of the chunk at a place, encoded; `None` if the store does not hold it.

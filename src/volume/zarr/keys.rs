@@ -21,8 +21,6 @@ pub(super) struct Keys {
     pub(super) path: PathBuf,
     place: Place,
     access: Access,
-    /// The number of bytes read since they were last asked for.
-    read: AtomicU64,
     /// The maximum number of bytes that are read at once.
     limit: AtomicU64,
 }
@@ -70,18 +68,12 @@ impl Keys {
     }
 
     fn new(path: &Path, place: Place, access: &Access) -> Self {
-        let (read, limit) = (AtomicU64::new(0), AtomicU64::new(MAX_HEADER));
-        Self { path: path.to_owned(), place, access: access.clone(), read, limit }
+        Self { path: path.to_owned(), place, access: access.clone(), limit: AtomicU64::new(MAX_HEADER) }
     }
 
     /// Permits to read this number of bytes at once.
     pub(super) fn permit(&self, bytes: u64) {
         self.limit.fetch_max(bytes, Ordering::Relaxed);
-    }
-
-    /// The number of bytes read since this was last asked.
-    pub(super) fn take_count(&self) -> u64 {
-        self.read.swap(0, Ordering::Relaxed)
     }
 
     /// The place of a key, for errors.
@@ -126,9 +118,7 @@ impl Keys {
         #[cfg(feature = "http")]
         if let Place::Address(http) = &self.place {
             // The length need not be asked for first.
-            let bytes = http.whole(key, self.limit.load(Ordering::Relaxed))?;
-            self.read.fetch_add(bytes.as_ref().map_or(0, |bytes| bytes.len() as u64), Ordering::Relaxed);
-            return Ok(bytes);
+            return http.whole(key, self.limit.load(Ordering::Relaxed));
         }
         let bytes = self.bytes(key)?;
         bytes.map(|bytes| self.range(key, 0..bytes)).transpose()
@@ -141,7 +131,6 @@ impl Keys {
         if count > limit {
             return Err(invalid(&path, "chunk", format!("{count} bytes"), format!("at most {limit} bytes")));
         }
-        self.read.fetch_add(count, Ordering::Relaxed);
         let missing = || io_error(&path)(ErrorKind::NotFound.into());
         match &self.place {
             Place::Folder => {

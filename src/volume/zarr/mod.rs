@@ -52,14 +52,12 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let too_many = |error| invalid(path, "data", format!("{count} samples: {error}"), "fewer");
     values.try_reserve_exact(count as usize).map_err(too_many)?;
     values.resize(count as usize, T::HOLE);
-    // What was read so far is metadata.
-    image.keys.take_count();
-    let chunks_read = level.array.read(&region, &mut values)?;
+    let held = level.array.read(&region, &mut values)?;
     let reads = StoreCounts {
         level: number as u64,
         chunks_total: level.array.count(&region),
-        chunks_read,
-        bytes_read: image.keys.take_count(),
+        chunks_read: held.chunks,
+        bytes_read: held.bytes,
         chunk_bytes: count * size_of::<T>() as u64,
     };
     let (spacing, kind) = (Some(level.grid.spacing), level.array.kind);
@@ -122,8 +120,6 @@ pub(super) fn open(path: &Path, access: &Access) -> Result<ZarrStore, VolumeErro
     let levels =
         image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() }).collect();
     let (channel, time) = (u64::from(channels.start), u64::from(selection.time.unwrap_or(0)));
-    // What was read so far is metadata.
-    image.keys.take_count();
     Ok(ZarrStore { image, levels, channel, time })
 }
 
@@ -144,8 +140,7 @@ impl Store for ZarrStore {
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
         check_box(&self.image.keys.path, &self.levels, level, (from, dims), values.len())?;
         let region = Region { channels: self.channel..self.channel + 1, time: self.time, from, dims };
-        self.image.levels[level].array.read(&region, values)?;
-        Ok(self.image.keys.take_count())
+        Ok(self.image.levels[level].array.read(&region, values)?.bytes)
     }
 
     fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError> {
