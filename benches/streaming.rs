@@ -75,7 +75,7 @@ fn draw(store: &Path, level: usize, memory: &str, classification: &str, folder: 
     let mut process = Command::new(env!("CARGO_BIN_EXE_sheetsplat"))
         .arg("render")
         .arg(store)
-        .args(["--backend", "cpu", "--memory", memory, "--level", &level.to_string(), "--overwrite"])
+        .args(["--backend", "cpu", "--memory", memory, "--level", &level.to_string()])
         .args(["--set", "image={width=1024,height=1024}", "--set", "camera={direction=[1,0.4,-0.3],fit=\"volume\"}"])
         .args(["--set", "transfer={color=[[0,[0.2,0.1,0]],[255,[1,0.9,0.8]]],opacity=[[60,0],[100,1]]}"])
         .args(["--set", "splatting.compositing=exponential"])
