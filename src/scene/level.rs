@@ -141,7 +141,7 @@ fn open_channels(scene: &Scene, options: &ReadOptions) -> Result<Vec<Open>, Volu
 /// coarsest; of a single one that is too large even so, every nth voxel.
 fn coarse_volume(scene: &Scene, open: &[Open], options: &ReadOptions) -> Result<Volume, VolumeError> {
     let bytes = FRAME_BYTES.min(options.memory_limit() / 8);
-    let is_small = |grid: &Grid| grid.dims.as_u64vec3().element_product().saturating_mul(4) <= bytes;
+    let is_small = |grid: &Grid| grid.voxels().saturating_mul(4) <= bytes;
     if open.iter().any(|(_, levels)| !levels.iter().any(is_small))
         && let (Some(Ok(store)), Some(path)) = (scene.open_store(options), scene.volume.path())
     {

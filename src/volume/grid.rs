@@ -83,6 +83,11 @@ impl Grid {
         Ok(())
     }
 
+    /// The number of voxels, or `u64::MAX` if a file states more than that.
+    pub(crate) fn voxels(&self) -> u64 {
+        self.dims.to_array().iter().fold(1, |product: u64, &n| product.saturating_mul(n.into()))
+    }
+
     /// The voxel at an index in memory (x fastest).
     pub fn voxel_at(&self, index: u32) -> UVec3 {
         let (x, rest) = (index % self.dims.x, index / self.dims.x);

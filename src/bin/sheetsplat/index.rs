@@ -33,8 +33,9 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         Failure::Input(format!("{}: found a volume that is not read by boxes, allowed: {allowed}", input.name))
     })?;
     let store = store.map_err(|error| input.failure(error))?;
-    let chunks = |level: &StoreLevel| level.chunks().as_u64vec3().element_product();
-    let total = store.levels().iter().map(chunks).sum::<u64>();
+    let chunks =
+        |level: &StoreLevel| level.chunks().to_array().iter().fold(1, |count: u64, &n| count.saturating_mul(n.into()));
+    let total = store.levels().iter().map(chunks).fold(0, u64::saturating_add);
     let bar = Mutex::new(Progress::new(usize::try_from(total).unwrap_or(usize::MAX), progress));
     let step = || bar.lock().unwrap_or_else(PoisonError::into_inner).step();
     let index = StoreIndex::new(&*store, &input.name, &step).map_err(|error| input.failure(error))?;

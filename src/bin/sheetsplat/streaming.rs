@@ -36,7 +36,7 @@ impl Streamed {
         let store = scene.open_store(&options)?.ok()?;
         let level = scene.level.unwrap_or(0) as usize;
         let of = store.levels().get(level)?;
-        let bytes = |dims: [u32; 3]| dims.into_iter().map(u64::from).product::<u64>().saturating_mul(4);
+        let bytes = |dims: [u32; 3]| dims.into_iter().fold(4, |bytes: u64, n| bytes.saturating_mul(n.into()));
         // Every thread that draws or reads holds some chunks, beside those that wait for other tiles.
         let least = bytes(of.chunk.to_array()).saturating_mul(4 * rayon::current_num_threads() as u64);
         (bytes(of.grid.dims.to_array()) > memory && least <= memory / 2).then_some(Self { store, level, memory })

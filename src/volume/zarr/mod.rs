@@ -82,7 +82,7 @@ fn level_of(image: &Image, channels: u64, bytes: usize, path: &Path, access: &Ac
         let allowed = if count == 1 { "0, the only one".to_owned() } else { format!("0 to {}", count - 1) };
         return Err(invalid(path, "level", number, allowed));
     }
-    let needs = |level: &Level| level.grid.dims.as_u64vec3().element_product().saturating_mul(channels * bytes as u64);
+    let needs = |level: &Level| level.grid.voxels().saturating_mul(channels * bytes as u64);
     let left = access.memory_left();
     let fits = |level: &Level| dims_of(level.grid.dims.to_array()).is_some() && needs(level) <= left;
     if fits(&image.levels[number]) || count == 1 {
