@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use crate::lists::iso_range::ValueSet;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Tables, TransferFunction};
+use crate::volume::range::{EMPTY, union};
 use crate::volume::{Grid, Volume};
 
 /// The values around a brick that bear on the image, beside those with an opacity, because of how values are composited.
@@ -68,7 +69,7 @@ impl BrickRanges {
         // One axis after the other: the minimum over a box is the minimum over z of those over y of those over x.
         let along_x: Vec<[f32; 2]> = (coefficients.par_chunks(nx))
             .flat_map_iter(|row| {
-                around(nx, rx).map(|range| row[range].iter().fold(EMPTY, |ends, &c| with(ends, [c; 2])))
+                around(nx, rx).map(|range| row[range].iter().fold(EMPTY, |ends, &c| union(ends, [c; 2])))
             })
             .collect();
         let along_y = strided(&along_x, bricks[0], ny, ry);
@@ -116,13 +117,6 @@ fn values_between(tables: &Tables) -> ValueSet {
     ValueSet::of_tables(&Tables { iso_ranges: iso_ranges.as_deref(), ..*tables })
 }
 
-const EMPTY: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
-
-/// The union of two ranges; NaN is ignored.
-fn with([min, max]: [f32; 2], [other_min, other_max]: [f32; 2]) -> [f32; 2] {
-    [min.min(other_min), max.max(other_max)]
-}
-
 /// The range of positions within `reach` of each brick along an axis.
 fn around(count: usize, reach: usize) -> impl Iterator<Item = std::ops::Range<usize>> {
     let side = SIDE as usize;
@@ -135,7 +129,7 @@ fn strided(ends: &[[f32; 2]], stride: usize, count: usize, reach: usize) -> Vec<
         around(count, reach)
             .flat_map(|range| {
                 (0..stride)
-                    .map(|at| range.clone().fold(EMPTY, |ends, step| with(ends, block[step * stride + at])))
+                    .map(|at| range.clone().fold(EMPTY, |ends, step| union(ends, block[step * stride + at])))
                     .collect::<Vec<_>>()
             })
             .collect::<Vec<_>>()
@@ -169,7 +163,7 @@ mod tests {
                 voxel.cmpge(low).all() && voxel.cmplt(high).all()
             };
             let found = (0..values.len() as u32).filter(inside).map(|index| values[index as usize]);
-            assert_eq!(ends, found.fold(EMPTY, |ends, value| with(ends, [value; 2])), "{at}");
+            assert_eq!(ends, found.fold(EMPTY, |ends, value| union(ends, [value; 2])), "{at}");
         }
     }
 

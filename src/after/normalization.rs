@@ -1,6 +1,8 @@
 //! The numbers that are splatted for values (SPEC §9): differences from the middle of the values' range, scaled by a power of two to about 1. An
 //! `f32` then keeps the digits in which values differ, sums of products cannot overflow, and scaling rounds nothing.
 
+use crate::volume::range::range_of;
+
 /// From values to the numbers that are splatted, `(value - base)·scale`, and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Normalization {
@@ -37,12 +39,6 @@ impl Normalization {
     pub fn apply(&self, value: f64) -> f64 {
         (value - self.base) * self.scale
     }
-}
-
-/// The minimum and maximum of some values; NaN is ignored. `None` if all are NaN.
-pub fn range_of(values: impl Iterator<Item = f32>) -> Option<[f32; 2]> {
-    let ends = values.fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], value| [min.min(value), max.max(value)]);
-    (ends[0] <= ends[1]).then_some(ends)
 }
 
 #[cfg(test)]

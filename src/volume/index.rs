@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::UVec3;
 use rayon::prelude::*;
 
+use super::range::{EMPTY, union};
 use super::{Store, StoreLevel, VolumeError};
 
 /// The first line of a file.
@@ -13,9 +14,6 @@ const TITLE: &str = "sheetsplat index 1";
 
 /// The most chunks of a level that are indexed.
 const MOST_CHUNKS: u128 = 1 << 26;
-
-/// No values.
-const EMPTY: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
 /// The range of the values in every chunk of a store.
 #[derive(Clone, Debug, PartialEq)]
@@ -153,10 +151,6 @@ fn count_of(chunks: UVec3) -> u128 {
 /// The range of the finite values.
 fn of_values(values: &[f32]) -> [f32; 2] {
     values.iter().filter(|value| value.is_finite()).fold(EMPTY, |range, &value| union(range, [value; 2]))
-}
-
-fn union([min, max]: [f32; 2], [other_min, other_max]: [f32; 2]) -> [f32; 2] {
-    [min.min(other_min), max.max(other_max)]
 }
 
 /// Numbers with spaces between.

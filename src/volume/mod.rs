@@ -32,6 +32,7 @@ pub(crate) mod npz;
 mod nrrd;
 mod numbers;
 mod orientation;
+pub(crate) mod range;
 mod raw;
 mod resample;
 mod sample;

@@ -145,3 +145,34 @@ fn bounds(volume: &Volume) -> String {
     let (low, high) = (0..8).map(corner).fold((opposite, opposite), |(low, high), at| (low.min(at), high.max(at)));
     format!("the box from {:.1?} to {:.1?}", low.to_array(), high.to_array())
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use crate::volume::{Grid, ReadOptions};
+
+    /// The centre of a coarser level that does not fill the finest one's box lies beside it.
+    #[test]
+    fn coarser_levels_lie_where_their_centres_are() {
+        let finest = Grid::new(UVec3::new(8, 2, 2), DVec3::ONE);
+        let coarser =
+            Grid::new(UVec3::new(5, 2, 2), DVec3::splat(2.0)).coarser_than(&finest, DVec3::new(1.5, 0.0, 0.0));
+        // Values are world positions along x.
+        let position = |grid: &Grid, index: u32| (grid.world_position(grid.voxel_at(index)) + grid.place()).x as f32;
+        let of = |grid: Grid| {
+            let values = (0..grid.dims.element_product()).map(|index| position(&grid, index)).collect();
+            Volume::piece(grid, values)
+        };
+        let access = Access::new(&ReadOptions::default()).unwrap();
+        let onto = of(coarser).onto(&of(finest), ("channel", Path::new("file")), &access).unwrap();
+        let mut inside = 0;
+        for index in 0..finest.dims.element_product() {
+            let (found, expected) = (onto.values()[index as usize], position(&finest, index));
+            assert_eq!(found.is_nan(), !(-2.5..=5.5).contains(&expected), "{index}");
+            assert!(found.is_nan() || (found - expected).abs() < 1e-5, "{index}: {found} {expected}");
+            inside += u32::from(!found.is_nan());
+        }
+        assert_eq!(inside, 7 * 4);
+    }
+}

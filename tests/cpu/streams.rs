@@ -142,6 +142,15 @@ fn assert_same(volume: &Volume, scene: &Scene, chunk: UVec3, memory: u64) -> Sto
     streamed.stats.store.unwrap()
 }
 
+/// [`assert_same`] for chunks of several sizes, and memory for all of them or for one.
+fn assert_same_in_chunks(scene: &Scene) {
+    let volume = values(scene);
+    for (chunk, memory) in [([32, 32, 32], 1 << 30), ([7, 30, 16], 1 << 30), ([16, 16, 16], 1 << 17)] {
+        let counts = assert_same(&volume, scene, chunk.into(), memory);
+        assert!(counts.chunks_read > 0 && counts.chunks_read <= counts.chunks_total, "{scene:?} {counts:?}");
+    }
+}
+
 #[test]
 fn streams_are_the_volume_in_memory() {
     let gradient = "transfer={color=[[0,[0,0,0]],[40,[1,0.5,0]],[160,[1,1,1]]],opacity=[[0,0],[40,0.02],[160,0.4]],gradient_opacity=[[0,0],[30,1]]}";
@@ -161,12 +170,7 @@ fn streams_are_the_volume_in_memory() {
         &["splatting.opacity_threshold=0.9", "camera.up=[0,1,0]", "camera.direction=[0,0,1]"],
         &[gradient],
     ] {
-        let scene = scene(sets);
-        let volume = values(&scene);
-        for (chunk, memory) in [([32, 32, 32], 1 << 30), ([7, 30, 16], 1 << 30), ([16, 16, 16], 1 << 17)] {
-            let counts = assert_same(&volume, &scene, chunk.into(), memory);
-            assert!(counts.chunks_read > 0 && counts.chunks_read <= counts.chunks_total, "{sets:?} {counts:?}");
-        }
+        assert_same_in_chunks(&scene(sets));
     }
 }
 
@@ -321,12 +325,7 @@ const AFTER: [&[&str]; 18] = [
 fn streams_classified_after_splatting_are_the_volume_in_memory() {
     let gradient = "transfer={color=[[0,[0,0,0]],[40,[1,0.5,0]],[160,[1,1,1]]],opacity=[[0,0],[40,0.02],[160,0.4]],gradient_opacity=[[0,0],[30,1]]}";
     for sets in AFTER.into_iter().chain([&[gradient][..]]) {
-        let scene = scene(&[&["splatting.classification=after"], sets].concat());
-        let volume = values(&scene);
-        for (chunk, memory) in [([32, 32, 32], 1 << 30), ([7, 30, 16], 1 << 30), ([16, 16, 16], 1 << 17)] {
-            let counts = assert_same(&volume, &scene, chunk.into(), memory);
-            assert!(counts.chunks_read > 0 && counts.chunks_read <= counts.chunks_total, "{sets:?} {counts:?}");
-        }
+        assert_same_in_chunks(&scene(&[&["splatting.classification=after"], sets].concat()));
     }
 }
 

@@ -132,6 +132,10 @@ impl<'a> TileWalk<'a> {
                 continue;
             }
             self.enter(slab);
+            if let Some(end) = self.blank_until() {
+                slab = end;
+                continue;
+            }
             self.composite(simd, slab);
             slab += 1;
         }
@@ -166,6 +170,13 @@ impl<'a> TileWalk<'a> {
         }
     }
 
+    /// The slab before which no voxel that the tile holds of a store has an opacity; `None` if one may have.
+    fn blank_until(&self) -> Option<i32> {
+        let blank =
+            |channel: &Channel<'_>| Some(channel.planes[0].held.as_ref().filter(|held| held.is_blank)?.slabs.end);
+        self.channels.iter().map(blank).reduce(|a, b| Some(a?.min(b?))).flatten()
+    }
+
     /// Classifies and composites a slab.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
@@ -174,9 +185,6 @@ impl<'a> TileWalk<'a> {
         for channel in channels.iter_mut().filter(|channel| !channel.active.is_empty()) {
             let wanted = channel.wanted(open);
             let Channel { frame, planes, .. } = channel;
-            if planes[0].held.as_ref().is_some_and(|held| held.is_blank) {
-                continue;
-            }
             if is_choice(frame.compositing) {
                 frame.choose(simd, &looks, planes, &wanted, chosen);
             } else {

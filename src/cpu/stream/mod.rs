@@ -17,9 +17,9 @@ use super::bin::Placed;
 use super::material::Material;
 use crate::lists::quad_plan::Overlaps;
 use crate::volume::Grid;
+use crate::volume::range::{EMPTY, union};
 pub(super) use chunk::Chunk;
 use pool::Pool;
-use ranges::{EMPTY, union};
 pub use renderer::{StreamError, StreamRenderer};
 use source::Source;
 

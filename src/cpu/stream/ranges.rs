@@ -44,17 +44,10 @@ impl Ranges {
     }
 }
 
-/// The range of two ranges' values.
-pub(super) fn union([min, max]: [f32; 2], [other_min, other_max]: [f32; 2]) -> [f32; 2] {
-    [min.min(other_min), max.max(other_max)]
-}
-
-/// The range of no values.
-pub(super) const EMPTY: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::volume::range::EMPTY;
 
     #[test]
     fn what_is_noted_is_known() {

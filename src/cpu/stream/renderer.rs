@@ -10,7 +10,7 @@ use super::Stream;
 use super::pool::{Pool, Reads};
 use super::ranges::Ranges;
 use super::source::{Source, Splats};
-use crate::after::normalization::{Normalization, range_of};
+use crate::after::normalization::Normalization;
 use crate::cpu::after::{self, Matter};
 use crate::cpu::frame::{Drawing, Frame, Host, Voxels};
 use crate::cpu::project::Projection;
@@ -28,6 +28,7 @@ use crate::settings::splatting::{Classification, Interpolation, Method};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
+use crate::volume::range::range_of;
 use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
 
 /// The minimum number of threads that read: a server, or a disk, answers several requests in the time of one.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::UVec3;
 
-use super::ranges::{EMPTY, Known, Ranges, union};
+use super::ranges::{Known, Ranges};
 use crate::cpu::bin::{Placed, place_box};
 use crate::cpu::project::Projection;
 use crate::error::setting::SettingError;
@@ -12,6 +12,7 @@ use crate::lists::brick::SIDE;
 use crate::lists::iso_range::ValueSet;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
+use crate::volume::range::{EMPTY, union};
 use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
 
 /// The minimum number of voxels along each axis of a chunk that is drawn. Smaller chunks of the store are read together.

@@ -194,7 +194,7 @@ impl Http {
             200 => Ok(Some(response)),
             // An empty value has no range.
             206 | 416 if is_range => Ok(Some(response)),
-            // Stores of objects forbid to list them, and so to tell that there is none.
+            // For a key that it does not hold, an object store answers 403 instead of 404 if the keys may not be listed.
             403 | 404 | 410 => Ok(None),
             _ => {
                 let allowed = "200 or 206, or 404 or 403 for a key that the store does not hold";
