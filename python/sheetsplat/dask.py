@@ -22,13 +22,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import dask
-from distributed import Client, Future, default_client
+from distributed import Client, Future, default_client, get_worker
 
 from .errors import SceneError
 from .image import Image
 from .part import Part, merge
 from .scene import Scene
-from .view import View, _frames, _is_scene_file
+from .view import View, _frames, _is_scene_file, _opened
 from .volume import _BUILTIN, Volume
 
 __all__ = ["orbit", "render"]
@@ -44,6 +44,7 @@ def render(
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
     side: str | None = None,
     backend: str = "cpu",
+    memory: int | str | None = None,
     **settings: Any,
 ) -> Future:
     """Draws a picture by the workers of a Dask cluster.
@@ -59,6 +60,10 @@ def render(
         The number of parts of about equal work. Without it, two for each thread of the workers.
     spacing, labels, scene, side, backend, **settings
         As for `View`.
+    memory : int or str, optional
+        Bytes that the values may take on each worker, such as ``"2GiB"``; without it, three quarters of a worker's limit.
+        A volume that takes more is streamed: each part reads only the chunks that matter to it. State it if
+        workers differ, because parts of a streamed volume do not merge with those of one in memory.
 
     Returns
     -------
@@ -73,7 +78,7 @@ def render(
     ``splatting.opacity_threshold = 1`` they are the whole picture's to rounding.
     """
     client = client or default_client()
-    what, look = _sent(client, source, spacing, labels, scene, settings)
+    what, look = _sent(client, source, spacing, labels, scene, settings, memory)
     count = _count(client, parts)
     start = _prepare(what, look, side, backend, False)
     return client.compute(_picture(what, start, 0.0, count, backend), retries=3)
@@ -92,13 +97,14 @@ def orbit(
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
     side: str | None = None,
     backend: str = "cpu",
+    memory: int | str | None = None,
     **settings: Any,
 ) -> list[Future]:
     """Draws a turntable by the workers of a Dask cluster: a future for each picture.
 
     Parameters
     ----------
-    source, client, spacing, labels, scene, side, backend, **settings
+    source, client, spacing, labels, scene, side, backend, memory, **settings
         As for `render`.
     count, turn, frames
         As for `View.orbit`.
@@ -106,7 +112,7 @@ def orbit(
         The number of parts of each picture; 1 is best where there are more pictures than workers.
     """
     client = client or default_client()
-    what, look = _sent(client, source, spacing, labels, scene, settings)
+    what, look = _sent(client, source, spacing, labels, scene, settings, memory)
     numbers, count_of_parts = _frames(count, frames), _count(client, parts)
     start = _prepare(what, look, side, backend, True)
     pictures = [_picture(what, start, turn / count * frame, count_of_parts, backend) for frame in numbers]
@@ -120,16 +126,22 @@ class _Source:
 
     token: str
     what: Any
+    look: Scene
     spacing: float | Sequence[float] | None
     labels: Any
+    memory: int | str | None
 
     def view(self, scene: Scene, side: str | None, backend: str) -> View:
-        if isinstance(self.what, Scene):
-            volume = self.what.load_volume()
-            if self.spacing is not None or self.labels is not None:
-                volume = Volume(volume, spacing=self.spacing, labels=self.labels)
-            return View(volume, scene=scene, side=side, backend=backend)
-        return View(self.what, spacing=self.spacing, labels=self.labels, scene=scene, side=side, backend=backend)
+        # Every worker opens it for the same scene, which decides the level.
+        memory = _limit() if self.memory is None else self.memory
+        volume = _opened(self.what, self.look, self.spacing, self.labels, memory)
+        return View(volume, scene=scene, side=side, backend=backend)
+
+
+def _limit() -> int | None:
+    """The bytes of values that fit on a worker, if it has a limit."""
+    limit = get_worker().memory_manager.memory_limit
+    return None if limit is None else max(1, limit // 4 * 3)
 
 
 def _sent(
@@ -139,6 +151,7 @@ def _sent(
     labels: Any,
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None,
     settings: dict[str, Any],
+    memory: int | str | None,
 ) -> tuple[Any, Scene]:
     """The source as the workers get it, sent once to each that needs it, and the scene, which is checked here."""
     if isinstance(source, Volume):
@@ -152,7 +165,7 @@ def _sent(
         if isinstance(source, (str, os.PathLike)):
             path = os.fsdecode(source)
             source = path if path.startswith(_BUILTIN) or "://" in path else os.path.abspath(path)
-    return client.scatter(_Source(uuid.uuid4().hex, source, spacing, labels), hash=False), look
+    return client.scatter(_Source(uuid.uuid4().hex, source, look, spacing, labels, memory), hash=False), look
 
 
 def _count(client: Client, parts: int | None) -> int:

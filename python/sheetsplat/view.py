@@ -14,7 +14,7 @@ from .errors import SceneError
 from .image import Image
 from .part import Part, merge
 from .scene import Scene
-from .volume import Volume
+from .volume import Volume, _open
 
 __all__ = ["View", "info", "orbit", "render", "sweep"]
 
@@ -42,6 +42,8 @@ class View:
         one; or ``"reference"``, slow and in 64 bits.
     adapter : str, optional
         Part of the name of the GPU.
+    memory : int or str, optional
+        As for `Volume`. Of a store with several levels the coarsest is drawn whose voxels are no larger than a pixel.
     **settings
         Settings over those of `scene`, as for `Scene`.
 
@@ -65,9 +67,10 @@ class View:
         side: str | None = None,
         backend: str = "cpu",
         adapter: str | None = None,
+        memory: int | str | None = None,
         **settings: Any,
     ) -> None:
-        volume, look = _what_and_how(source, spacing, labels, scene, settings)
+        volume, look = _what_and_how(source, spacing, labels, scene, settings, memory)
         if side is not None:
             look = look.seen_from(volume, side)
         self._volume, self._scene = volume, look
@@ -177,23 +180,39 @@ def _what_and_how(
     labels: Any,
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None,
     settings: dict[str, Any],
+    memory: int | str | None,
 ) -> tuple[Volume, Scene]:
     if isinstance(source, Scene) or _is_scene_file(source):
-        look = Scene(source, **settings)
+        source = look = Scene(source, **settings)
         if scene is not None:
             raise TypeError("the source is a scene; give either it or `scene`")
-        volume = look.load_volume()
     else:
         look = Scene(scene, **settings)
         if any(key == "volume" or key.startswith("volume.") for key in settings):
             found, allowed = "a volume beside the source", "no such key: `source`, `spacing` and `labels`"
             raise SceneError(f"volume: found {found}, allowed: {allowed}", "volume", found, allowed)
-        volume = source if isinstance(source, Volume) else Volume(source, spacing=spacing, labels=labels)
-        if volume is not source:
-            return volume, look
+    return _opened(source, look, spacing, labels, memory), look
+
+
+def _opened(
+    source: Any,
+    look: Scene,
+    spacing: float | Sequence[float] | None,
+    labels: Any,
+    memory: int | str | None,
+) -> Volume:
+    """The volume that a scene names, or another source's for a scene that may choose its level."""
+    if isinstance(source, Scene):
+        volume = source.load_volume(memory=memory)
+    elif isinstance(source, (str, os.PathLike)):
+        volume = Volume._of(_open(source, memory, [None, None, None], look._native))
+    elif isinstance(source, Volume):
+        volume = source
+    else:
+        return Volume(source, spacing=spacing, labels=labels)
     if spacing is not None or labels is not None:
         volume = Volume(volume, spacing=spacing, labels=labels)
-    return volume, look
+    return volume
 
 
 def _is_scene_file(source: Any) -> bool:
@@ -219,7 +238,7 @@ def render(source: Any, **arguments: Any) -> Image:
     source
         What is drawn: an array ``[z, y, x]``, an image of SimpleITK or nibabel, a path, a `Volume` or a `Scene`.
     **arguments
-        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, and settings.
+        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, and settings.
 
     Returns
     -------
@@ -364,7 +383,9 @@ def _swept(view: View, scenes: list[tuple[dict[str, Any], Scene]]) -> Iterator[t
         yield settings, view.render()
 
 
-def info(source: Any, *, spacing: float | Sequence[float] | None = None) -> dict[str, Any]:
+def info(
+    source: Any, *, spacing: float | Sequence[float] | None = None, memory: int | str | None = None
+) -> dict[str, Any]:
     """Facts about a volume, as `Volume.info`.
 
     Examples
@@ -372,4 +393,4 @@ def info(source: Any, *, spacing: float | Sequence[float] | None = None) -> dict
     >>> info("builtin:cube:8")["shape"]
     [8, 8, 8]
     """
-    return _what_and_how(source, spacing, None, None, {})[0].info()
+    return _what_and_how(source, spacing, None, None, {}, memory)[0].info()

@@ -37,6 +37,12 @@ class Volume:
         The segment of each voxel, whole numbers from 0 to 65535, of the same shape.
     channel_axis : int, optional
         The axis of an array of four dimensions along which channels follow one another; the others are z, y, x.
+    memory : int or str, optional
+        Bytes that the values may take, such as ``"2GiB"``; three quarters of the machine's without it. A volume of a path
+        that takes more, and can be read by boxes, is streamed: read while it is drawn.
+    channel, time, level : int, optional
+        The channel, the time and the level of a path that holds several, counted from 0: all channels, the first time
+        and the finest level without them.
 
     Examples
     --------
@@ -55,6 +61,10 @@ class Volume:
         spacing: float | Sequence[float] | None = None,
         labels: Any = None,
         channel_axis: int | None = None,
+        memory: int | str | None = None,
+        channel: int | None = None,
+        time: int | None = None,
+        level: int | None = None,
     ) -> None:
         steps = None if spacing is None else _spacing(spacing)
         tags = None if labels is None else _array(labels, "labels")
@@ -65,7 +75,7 @@ class Volume:
         if isinstance(source, Volume):
             self._native = source._native
         elif isinstance(source, (str, os.PathLike)):
-            self._native = _open(os.fspath(source))
+            self._native = _open(source, memory, [channel, time, level], None)
         else:
             array, own_spacing, axes, origin = _converted(source)
             self._native = native.Volume.from_arrays([array], steps or own_spacing, tags, axes, origin)
@@ -103,8 +113,18 @@ class Volume:
 
     @property
     def holes(self) -> int:
-        """The number of voxels whose values are NaN or infinite."""
+        """The number of voxels whose values are NaN or infinite; in a sample of the values if the volume is streamed."""
         return self._native.holes
+
+    @property
+    def streamed(self) -> bool:
+        """Whether the volume is read while it is drawn, as it does not fit into memory."""
+        return self._native.streamed
+
+    @property
+    def level(self) -> int:
+        """The level that is drawn, 0 for the finest."""
+        return self._native.level
 
     @property
     def values(self) -> NDArray[np.float32]:
@@ -116,7 +136,10 @@ class Volume:
         return self._native.values(channel)
 
     def info(self) -> dict[str, Any]:
-        """Facts about the volume: its grid, the distribution of its values, and the preset that suits it."""
+        """Facts about the volume: its grid, the distribution of its values, and the preset that suits it.
+
+        Of a volume that is streamed the distribution is that of a sample of the values.
+        """
         return self._native.info()
 
     def __repr__(self) -> str:
@@ -124,11 +147,20 @@ class Volume:
         return f"<sheetsplat.Volume of {z}×{y}×{x} voxels, spacing {self.spacing}>"
 
 
-def _open(path: str | bytes) -> native.Volume:
+def _open(
+    path: str | os.PathLike[str],
+    memory: int | str | None,
+    selection: list[int | None],
+    scene: native.Scene | None,
+) -> native.Volume:
     name = os.fsdecode(path)
     if name.startswith(_BUILTIN):
         return native.Volume.builtin(name.removeprefix(_BUILTIN))
-    return native.Volume.open(name)
+    return native.Volume.open(name, _memory(memory), selection, scene)
+
+
+def _memory(memory: int | str | None) -> str | None:
+    return None if memory is None else str(memory)
 
 
 def _spacing(spacing: Any) -> tuple[float, float, float]:

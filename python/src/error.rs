@@ -108,6 +108,7 @@ impl From<RenderError> for Raised {
     fn from(error: RenderError) -> Self {
         match error {
             RenderError::OutOfRange(error) => error.into(),
+            RenderError::Volume(error) => error.into(),
             error @ RenderError::Limit { .. } => Self(classes::RenderError::new_err(error.to_string())),
             error => Self(classes::DeviceError::new_err(error.to_string())),
         }

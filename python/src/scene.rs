@@ -10,7 +10,7 @@ use sheetsplat::volume::PatientSide;
 
 use crate::error::{Raised, setting};
 use crate::settings;
-use crate::volume::Volume;
+use crate::volume::{Volume, reading};
 
 /// The sides of a patient.
 const SIDES: [(&str, PatientSide); 6] = [
@@ -71,17 +71,18 @@ impl Scene {
     }
 
     /// The volume that the scene names.
-    fn load_volume(&self, py: Python<'_>) -> PyResult<Volume> {
-        let volume = py.detach(|| self.scene.load_volume().map_err(Raised::from))?;
-        Ok(Volume(volume.into()))
+    fn load_volume(&self, py: Python<'_>, memory: Option<&str>) -> PyResult<Volume> {
+        let options = reading(memory)?;
+        let (volume, _) = py.detach(|| self.scene.open_volume_and_files(&options).map_err(Raised::from))?;
+        Ok(Volume(volume))
     }
 
     /// The scene with everything stated that depends on the volume; `all_around` for a camera that turns.
     fn explicit(&self, py: Python<'_>, volume: &Volume, all_around: bool) -> PyResult<Self> {
         let explicit = py.detach(|| {
-            self.scene.check_volume(&volume.0)?;
-            let scene = &self.scene;
-            Ok::<_, Raised>(if all_around { scene.explicit_all_around(&volume.0) } else { scene.explicit(&volume.0) })
+            let (scene, volume) = (&self.scene, volume.0.sample());
+            scene.check_volume(volume)?;
+            Ok::<_, Raised>(if all_around { scene.explicit_all_around(volume) } else { scene.explicit(volume) })
         })?;
         Ok(self.derived(explicit)?)
     }
@@ -100,7 +101,7 @@ impl Scene {
             let allowed = SIDES.map(|(name, _)| format!("{name:?}")).join(", ");
             return Err(setting("side", &format!("{side:?}"), &allowed).into());
         };
-        let Some(orientation) = volume.0.orientation() else {
+        let Some(orientation) = volume.0.sample().orientation() else {
             let allowed = "a volume that says how the patient lies, or camera.direction and camera.up";
             return Err(setting("side", "a volume without orientation", allowed).into());
         };

@@ -8,10 +8,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sheetsplat::appearance::{Preset, quantiles};
 use sheetsplat::glam::{DMat3, DVec3, UVec3};
-use sheetsplat::volume::{Labels, Orientation, builtin};
+use sheetsplat::scene::{OpenVolume, VolumeSource};
+use sheetsplat::volume::{Labels, Orientation, ReadOptions, builtin};
 
 use crate::array;
-use crate::error::{self, Raised};
+use crate::error::{self, Raised, setting};
+use crate::scene::Scene;
 
 /// The name of volumes from arrays in errors.
 const ORIGIN: &str = "array";
@@ -29,14 +31,35 @@ const PERCENTILES: [(f64, &str); 9] = [
     (0.999, "99.9"),
 ];
 
-/// A volume, shared by every view of it.
+/// A volume, shared by every view of it: in memory, or read while it is drawn.
 #[pyclass(frozen, module = "sheetsplat._native")]
-pub(crate) struct Volume(pub(crate) Arc<sheetsplat::Volume>);
+pub(crate) struct Volume(pub(crate) OpenVolume);
 
 impl Volume {
     fn with(py: Python<'_>, make: impl FnOnce() -> Result<sheetsplat::Volume, Raised> + Send) -> PyResult<Self> {
-        Ok(Self(Arc::new(py.detach(make)?)))
+        Ok(Self(py.detach(make)?.into()))
     }
+
+    /// The volume, which must be in memory for something.
+    fn whole(&self, field: &str) -> Result<&Arc<sheetsplat::Volume>, Raised> {
+        match &self.0 {
+            OpenVolume::Whole(volume) => Ok(volume),
+            OpenVolume::Streamed(_) => {
+                Err(error::volume(field, "a volume that is streamed", "one in memory: a coarser level, or more memory"))
+            }
+        }
+    }
+}
+
+/// The options for reading with a memory limit, such as `2GiB`.
+pub(crate) fn reading(memory: Option<&str>) -> Result<ReadOptions, Raised> {
+    let mut options = ReadOptions::default();
+    let parse = |text: &str| {
+        let parsed = ReadOptions::parse_memory(text);
+        parsed.map_err(|allowed| setting("memory", &format!("{text:?}"), allowed.trim_start_matches("allowed: ")))
+    };
+    options.memory = memory.map(parse).transpose()?;
+    Ok(options)
 }
 
 #[pymethods]
@@ -68,10 +91,31 @@ impl Volume {
         })
     }
 
-    /// A volume file, or a folder of slices.
+    /// A volume file, or a folder of slices: the channel, the time and the level that `selection` states. The scene in which it will be shown chooses a level
+    /// that is left open, or the finest is taken.
     #[staticmethod]
-    fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Self::with(py, || Ok(sheetsplat::Volume::open(&path)?))
+    fn open(
+        py: Python<'_>,
+        path: PathBuf,
+        memory: Option<&str>,
+        selection: [Option<u32>; 3],
+        scene: Option<&Scene>,
+    ) -> PyResult<Self> {
+        let options = reading(memory)?;
+        let source = VolumeSource::File(path);
+        let mut shown = match scene {
+            Some(scene) => sheetsplat::Scene { volume: source, ..scene.scene.clone() },
+            None => sheetsplat::Scene::from_volume(source, &[]).map_err(Raised::from)?,
+        };
+        [shown.index, shown.time, shown.level] = selection;
+        (shown.spacing, shown.labels) = (None, None);
+        if scene.is_none() {
+            shown.level = shown.level.or(Some(0));
+        }
+        for channel in &mut shown.further {
+            (channel.volume, channel.spacing, channel.labels) = (VolumeSource::Memory, None, None);
+        }
+        Ok(Self(py.detach(|| Ok::<_, Raised>(shown.open_volume_and_files(&options)?.0))?))
     }
 
     /// A procedural volume.
@@ -84,8 +128,9 @@ impl Volume {
     #[pyo3(signature = (spacing=None, labels=None))]
     fn replaced(&self, py: Python<'_>, spacing: Option<[f64; 3]>, labels: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
         let labels = labels.map(array::labels).transpose()?;
+        let whole = self.whole("spacing or labels")?;
         Self::with(py, || {
-            let mut volume = (*self.0).clone();
+            let mut volume = (**whole).clone();
             if let Some(spacing) = spacing {
                 volume = volume.with_spacing(ORIGIN, zyx(spacing))?;
             }
@@ -96,44 +141,58 @@ impl Volume {
     /// The number of voxels along z, y and x.
     #[getter]
     fn shape(&self) -> [u32; 3] {
-        let UVec3 { x, y, z } = self.0.dims();
+        let UVec3 { x, y, z } = self.0.grid().dims;
         [z, y, x]
     }
 
     /// World units between voxels along z, y and x.
     #[getter]
     fn spacing(&self) -> [f64; 3] {
-        let DVec3 { x, y, z } = self.0.spacing();
+        let DVec3 { x, y, z } = self.0.grid().spacing;
         [z, y, x]
     }
 
     /// The number of channels.
     #[getter]
     fn channels(&self) -> usize {
-        self.0.channels().count()
+        self.0.sample().channels().count()
     }
 
     #[getter]
     fn unit(&self) -> Option<&str> {
-        self.0.unit()
+        self.0.sample().unit()
     }
 
+    /// Of a volume that is streamed, in the sample.
     #[getter]
     fn holes(&self) -> u64 {
-        self.0.holes()
+        self.0.sample().holes()
+    }
+
+    /// Whether the volume is read while it is drawn.
+    #[getter]
+    fn streamed(&self) -> bool {
+        matches!(self.0, OpenVolume::Streamed(_))
+    }
+
+    /// The number of the level that is drawn.
+    #[getter]
+    fn level(&self) -> u32 {
+        self.0.level()
     }
 
     /// A copy of a channel's values, `[z, y, x]`.
     fn values<'py>(&self, py: Python<'py>, channel: usize) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let count = self.channels();
         let allowed = || error::volume("channel", &channel.to_string(), &format!("0 to {}", count - 1));
-        let channel = self.0.channels().nth(channel).ok_or_else(allowed)?;
+        let channel = self.whole("values")?.channels().nth(channel).ok_or_else(allowed)?;
         PyArray1::from_slice(py, channel.values()).reshape(self.shape().map(|size| size as usize))
     }
 
-    /// Facts about the volume, by the names of `sheetsplat info --json`; sizes and spacings are in the order z, y, x.
+    /// Facts about the volume, by the names of `sheetsplat info --json`; sizes and spacings are in the order z, y, x. Of one that is streamed, the values are those
+    /// of the sample.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let volume = &self.0;
+        let volume = self.0.sample();
         let ([min, max, mean], percentiles, suggested) = py.detach(|| {
             let shares = PERCENTILES.map(|(share, _)| share);
             (extent_and_mean(volume.values()), quantiles(volume.values(), |_| true, shares), Preset::suggested(volume))
@@ -141,6 +200,8 @@ impl Volume {
         let info = PyDict::new(py);
         info.set_item("shape", self.shape())?;
         info.set_item("spacing", self.spacing())?;
+        info.set_item("level", self.level())?;
+        info.set_item("streamed", self.streamed())?;
         info.set_item("unit", volume.unit())?;
         info.set_item("format", volume.encoding().map(|encoding| encoding.format))?;
         info.set_item("type", volume.encoding().map(|encoding| encoding.sample_type.to_string()))?;

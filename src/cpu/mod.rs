@@ -68,7 +68,7 @@ use cut::Surfaces;
 use frame::{Drawing, Host};
 use layer::Layer;
 pub use simd::Simd;
-pub use stream::{StreamError, StreamRenderer};
+pub use stream::StreamRenderer;
 
 /// A view of a volume, drawn on the CPU.
 #[derive(Clone, Debug)]
@@ -251,7 +251,7 @@ impl CpuRenderer {
             return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());
         }
         let (Drawing { content, counts, .. }, view) = self.drawing(window.clone(), true)?;
-        let part = Part::new((&self.volume, &self.scene), &view, window, content)?;
+        let part = Part::new((&self.volume.clone().into(), &self.scene), &view, window, content)?;
         Ok((part, statistics(self.simd, self.size(), counts, start)))
     }
 

@@ -1,7 +1,8 @@
-//! Errors of the renderer. The errors of loading are defined beside volumes and scenes; [`headless`](crate::headless) unites them all.
+//! Errors of the renderer, and of volumes. Those of scenes are defined beside them; [`headless`](crate::headless) unites them all.
 
 pub(crate) mod device;
 pub(crate) mod setting;
+pub(crate) mod volume;
 
 #[cfg(feature = "gpu")]
 use wgpu::Device;
@@ -9,6 +10,7 @@ use wgpu::Device;
 #[cfg(feature = "gpu")]
 use device::DeviceFault;
 use setting::SettingError;
+use volume::VolumeError;
 
 /// Why a frame could not be prepared or read back.
 #[derive(Debug, thiserror::Error)]
@@ -17,6 +19,9 @@ pub enum RenderError {
     /// A setting is invalid, or this volume or device does not support it, or a host's matrix or texture does not fit.
     #[error(transparent)]
     OutOfRange(#[from] SettingError),
+    /// A volume that is read while it is drawn could not be read.
+    #[error(transparent)]
+    Volume(#[from] VolumeError),
     /// The frame needs more than a limit of the device allows.
     #[error("{what}: the device's {limit} is {actual}, required: {required}")]
     #[non_exhaustive]

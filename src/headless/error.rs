@@ -1,7 +1,5 @@
 //! All errors of headless rendering in one type.
 
-#[cfg(feature = "cpu")]
-use crate::cpu::StreamError;
 use crate::error::RenderError;
 use crate::error::device::DeviceError;
 use crate::scene::SceneError;
@@ -22,15 +20,14 @@ pub enum Error {
     Device(#[from] DeviceError),
     /// The frame.
     #[error(transparent)]
-    Render(#[from] RenderError),
+    Render(RenderError),
 }
 
-#[cfg(feature = "cpu")]
-impl From<StreamError> for Error {
-    fn from(error: StreamError) -> Self {
+impl From<RenderError> for Error {
+    fn from(error: RenderError) -> Self {
         match error {
-            StreamError::Volume(error) => error.into(),
-            StreamError::Render(error) => error.into(),
+            RenderError::Volume(error) => Self::Volume(error),
+            error => Self::Render(error),
         }
     }
 }

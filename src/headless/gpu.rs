@@ -90,7 +90,7 @@ impl GpuHeadless {
     /// # Errors
     /// If the volume cannot be loaded, the scene needs more than the device or the renderer can do, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
-        load_and_render(scene, |volume| self.render_volume(volume, scene))
+        load_and_render(scene, Scene::load_volume, |volume| self.render_volume(volume, scene))
     }
 
     /// Renders a volume that is already in memory. The scene's own volume is ignored.
@@ -150,7 +150,7 @@ impl GpuHeadless {
         let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum);
         let chosen = (is_choice && classification == Classification::After).then_some(compositing);
         let content = content::content((&self.device, &self.queue), frame, &window.region, chosen)?;
-        let part = Part::new((view.volume.volume(), &view.scene), &frame.view, window, content)?;
+        let part = Part::new((&view.volume.volume().clone().into(), &view.scene), &frame.view, window, content)?;
         let stats = self.stats(view, counts, 0, [prepare_ms, milliseconds_since(start)])?;
         Ok((part, stats))
     }

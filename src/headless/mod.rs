@@ -16,8 +16,6 @@ pub mod readback;
 mod reference;
 mod view;
 
-use std::sync::Arc;
-
 use web_time::Instant;
 
 pub use self::error::Error;
@@ -28,18 +26,17 @@ use self::reference::ReferenceView;
 pub use self::view::HeadlessView;
 use self::view::ViewBackend;
 #[cfg(feature = "cpu")]
-use crate::cpu::CpuRenderer;
+use crate::cpu::{CpuRenderer, StreamRenderer};
 use crate::error::RenderError;
 use crate::error::device::DeviceError;
-#[cfg(any(feature = "gpu", feature = "cpu"))]
 use crate::error::setting::SettingError;
 use crate::part::Part;
 use crate::pick::Pick;
 pub use crate::rendering::{Backend, Rendering};
-use crate::scene::Scene;
+use crate::scene::{OpenVolume, Scene};
 use crate::settings::window::Window;
 use crate::stats::Stats;
-use crate::volume::Volume;
+use crate::volume::{StreamedVolume, VolumeError};
 
 /// Renders with one backend. On the GPU it opens its own device; on the CPU it needs no driver.
 #[derive(Debug)]
@@ -107,19 +104,20 @@ impl Headless {
         }
     }
 
-    /// Loads the scene's volume and renders it.
+    /// Opens the scene's volume and renders it: a volume that does not fit into memory is read while it is drawn, where that can be
+    /// ([`Scene::open_volume`]).
     ///
     /// # Errors
-    /// If the volume cannot be loaded, the backend cannot draw one of the scene's settings, or the device fails.
+    /// If the volume cannot be read, the backend cannot draw one of the scene's settings, or the device fails.
     pub fn render(&self, scene: &Scene) -> Result<Rendering, Error> {
-        load_and_render(scene, |volume| self.render_volume(volume, scene))
+        load_and_render(scene, Scene::open_volume, |volume| self.render_volume(volume, scene))
     }
 
-    /// Renders a volume that is already in memory. The scene's own volume is ignored.
+    /// Renders a volume that is already open. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the backend cannot draw one of the scene's settings, or the device fails.
-    pub fn render_volume(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Rendering, RenderError> {
+    /// If the backend cannot draw the volume or one of the scene's settings, or the device fails.
+    pub fn render_volume(&self, volume: impl Into<OpenVolume>, scene: &Scene) -> Result<Rendering, RenderError> {
         view_and_draw(|| self.view(volume, scene), |view| self.draw(view))
     }
 
@@ -130,7 +128,7 @@ impl Headless {
     /// the image, or the device fails.
     pub fn render_part(&self, scene: &Scene, window: &Window) -> Result<Part, Error> {
         scene.check().map_err(RenderError::from)?;
-        let volume = scene.load_volume()?;
+        let volume = scene.open_volume()?;
         let mut view = self.view(volume, scene)?;
         Ok(self.draw_part(&mut view, window)?.0)
     }
@@ -146,19 +144,25 @@ impl Headless {
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.draw_part(view, window),
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => view.draw_part(window),
+            #[cfg(feature = "cpu")]
+            (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.draw_part(window),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw_part(window),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
-        Ok((part, Stats { store: reads, ..stats }))
+        Ok((part, Stats { store: stats.store.or(reads), ..stats }))
     }
 
     /// A view of a volume with a scene's settings, for any number of frames. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the backend cannot draw one of the scene's settings, the volume is larger than the device's textures, or the device fails.
-    pub fn view(&self, volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<HeadlessView, RenderError> {
-        let volume = volume.into();
+    /// If the backend cannot draw one of the scene's settings, the volume is larger than the device's textures, or the device fails; or if the volume is read
+    /// while it is drawn, which only the CPU backend does, also for [`Backend::Auto`] where nothing asks for the GPU.
+    pub fn view(&self, volume: impl Into<OpenVolume>, scene: &Scene) -> Result<HeadlessView, RenderError> {
+        let volume = match volume.into() {
+            OpenVolume::Whole(volume) => volume,
+            OpenVolume::Streamed(volume) => return self.stream(volume, scene),
+        };
         let reads = volume.reads();
         #[cfg(all(feature = "gpu", feature = "cpu"))]
         if self.may_leave_gpu && crate::renderer::scene_view::check_channels(&volume, scene).is_err() {
@@ -173,6 +177,25 @@ impl Headless {
             Drawer::Reference => ViewBackend::Reference(Box::new(ReferenceView::new(volume, scene)?)),
         };
         Ok(HeadlessView::new(backend, reads))
+    }
+
+    /// A view of a volume that is read while it is drawn.
+    #[cfg(feature = "cpu")]
+    fn stream(&self, volume: StreamedVolume, scene: &Scene) -> Result<HeadlessView, RenderError> {
+        if !self.draws_by_cpu() {
+            return Err(self.refuse_stream().into());
+        }
+        Ok(HeadlessView::new(ViewBackend::Stream(Box::new(StreamRenderer::new(volume, scene)?)), None))
+    }
+
+    #[cfg(not(feature = "cpu"))]
+    fn stream(&self, _volume: StreamedVolume, _scene: &Scene) -> Result<HeadlessView, RenderError> {
+        Err(self.refuse_stream().into())
+    }
+
+    fn refuse_stream(&self) -> SettingError {
+        let found = format!("a volume that is streamed, with the {} backend", self.backend());
+        SettingError::new("volume", found, "the cpu backend, a level that fits into memory, or more memory")
     }
 
     /// Changes a view's scene, whose own volume is ignored. Only what depends on the change is computed again: on the CPU as
@@ -195,6 +218,8 @@ impl Headless {
             }
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => view.set_scene(scene),
+            #[cfg(feature = "cpu")]
+            (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.set_scene(scene),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.set_scene(scene),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
@@ -212,11 +237,14 @@ impl Headless {
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.draw(view),
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => view.draw(),
+            #[cfg(feature = "cpu")]
+            (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.draw(),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw(),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
-        Ok(Rendering { stats: Stats { store: reads, ..rendering.stats }, ..rendering })
+        let store = rendering.stats.store.or(reads);
+        Ok(Rendering { stats: Stats { store, ..rendering.stats }, ..rendering })
     }
 
     /// The first voxel that the last drawn frame of a view shows at a pixel, counted from the upper left; `None` where the pixel does not reach
@@ -230,6 +258,8 @@ impl Headless {
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.pick(view, pixel),
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => Ok(view.pick(pixel)?),
+            #[cfg(feature = "cpu")]
+            (_, ViewBackend::Stream(_)) if self.draws_by_cpu() => Err(view::no_first_hits().into()),
             (Drawer::Reference, ViewBackend::Reference(view)) => Ok(view.pick(pixel)?),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
@@ -256,15 +286,16 @@ impl Headless {
     }
 }
 
-/// Loads a scene's volume and renders it by `render_volume`; the statistics hold the time of loading.
-fn load_and_render(
+/// Opens a scene's volume and renders it by `render_volume`; the statistics hold the time of loading.
+fn load_and_render<V>(
     scene: &Scene,
-    render_volume: impl FnOnce(Volume) -> Result<Rendering, RenderError>,
+    open: impl FnOnce(&Scene) -> Result<V, VolumeError>,
+    render_volume: impl FnOnce(V) -> Result<Rendering, RenderError>,
 ) -> Result<Rendering, Error> {
-    // An invalid scene is refused before its volume is loaded.
+    // An invalid scene is refused before its volume is read.
     scene.check().map_err(RenderError::from)?;
     let start = Instant::now();
-    let volume = scene.load_volume()?;
+    let volume = open(scene)?;
     let load_ms = milliseconds_since(start);
     let mut rendering = render_volume(volume)?;
     rendering.stats.load_ms = load_ms;

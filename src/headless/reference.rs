@@ -76,7 +76,7 @@ impl ReferenceView {
         let view = ViewGeometry::new(volume.grid(), &framed.camera, &framed.splatting, [width, height])?;
         let opened = window.opened(&view.slabs_of(volume.grid()));
         let content = reference::part(volume, transfer, scene, &opened)?;
-        let part = Part::new((volume, scene), &view, window, content)?;
+        let part = Part::new((&volume.clone().into(), scene), &view, window, content)?;
         Ok((part, self.stats(start)?))
     }
 

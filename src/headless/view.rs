@@ -4,7 +4,7 @@
 use super::Backend;
 use super::reference::ReferenceView;
 #[cfg(feature = "cpu")]
-use crate::cpu::CpuRenderer;
+use crate::cpu::{CpuRenderer, StreamRenderer};
 use crate::error::setting::{Interval, SettingError};
 #[cfg(feature = "gpu")]
 use crate::renderer::scene_view::SceneView;
@@ -27,6 +27,9 @@ pub(super) enum ViewBackend {
     Gpu(Box<SceneView>),
     #[cfg(feature = "cpu")]
     Cpu(Box<CpuRenderer>),
+    /// A volume that is read while the CPU draws it.
+    #[cfg(feature = "cpu")]
+    Stream(Box<StreamRenderer>),
     Reference(Box<ReferenceView>),
 }
 
@@ -37,7 +40,7 @@ impl ViewBackend {
             #[cfg(feature = "gpu")]
             Self::Gpu(_) => Backend::Gpu,
             #[cfg(feature = "cpu")]
-            Self::Cpu(_) => Backend::Cpu,
+            Self::Cpu(_) | Self::Stream(_) => Backend::Cpu,
             Self::Reference(_) => Backend::Reference,
         }
     }
@@ -63,6 +66,8 @@ impl HeadlessView {
             ViewBackend::Gpu(view) => view.scene(),
             #[cfg(feature = "cpu")]
             ViewBackend::Cpu(view) => view.scene(),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Stream(view) => view.scene(),
             ViewBackend::Reference(view) => view.scene(),
         }
     }
@@ -77,6 +82,8 @@ impl HeadlessView {
             ViewBackend::Gpu(view) => view.set_camera(camera),
             #[cfg(feature = "cpu")]
             ViewBackend::Cpu(view) => view.set_camera(camera),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Stream(view) => view.set_camera(camera),
             ViewBackend::Reference(view) => view.set_camera(camera),
         }
     }
@@ -97,14 +104,24 @@ impl HeadlessView {
     /// [`Compositing::Surface`](crate::settings::Compositing::Surface) the depth is the surface's, whatever the value.
     ///
     /// # Errors
-    /// If the value is not in (0, 1]; then nothing changes.
+    /// If the value is not in (0, 1], or the volume is read while it is drawn; then nothing changes.
     pub fn set_first_hit(&mut self, opacity: Option<f64>) -> Result<(), SettingError> {
         match &mut self.backend {
             #[cfg(feature = "gpu")]
             ViewBackend::Gpu(view) => view.set_first_hit(opacity),
             #[cfg(feature = "cpu")]
             ViewBackend::Cpu(view) => view.set_first_hit(opacity),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Stream(_) if opacity.is_none() => Ok(()),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Stream(_) => Err(no_first_hits()),
             ViewBackend::Reference(view) => view.set_first_hit(opacity),
         }
     }
+}
+
+/// The error for first hits of a volume that is read while it is drawn.
+#[cfg(feature = "cpu")]
+pub(super) fn no_first_hits() -> SettingError {
+    SettingError::new("first_hit", "first hits of a volume that is streamed", "none, or more memory")
 }

@@ -2,19 +2,20 @@
 
 use std::path::Path;
 
-use crate::scene::{Scene, SceneError, VolumeSource};
+use crate::scene::{OpenVolume, Scene, SceneError, VolumeSource};
 use crate::settings::splatting::Rasterizer;
 use crate::volume::Volume;
 
 /// The text that begins what is hashed; another meaning of fingerprints needs another text.
 const DOMAIN: &str = "sheetsplat part 1\n";
 
-/// The fingerprint of a scene of a volume, as hexadecimal digits. It is the same on every machine.
+/// The fingerprint of a scene of a volume, as hexadecimal digits. It is the same on every machine. Of a volume that is streamed it has the store's identity in
+/// place of the values.
 ///
 /// # Errors
 /// If the scene cannot be written as TOML.
-pub(super) fn fingerprint(volume: &Volume, scene: &Scene) -> Result<String, SceneError> {
-    let explicit = scene.explicit(volume);
+pub(super) fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, SceneError> {
+    let explicit = scene.explicit(volume.sample());
     let mut hash = blake3::Hasher::new();
     hash.update(DOMAIN.as_bytes()).update(settings(explicit)?.as_bytes());
     let grid = volume.grid();
@@ -27,7 +28,15 @@ pub(super) fn fingerprint(volume: &Volume, scene: &Scene) -> Result<String, Scen
             hash.update(&number.to_le_bytes());
         }
     }
-    // In blocks, because the hash is fastest over long slices.
+    match volume {
+        OpenVolume::Whole(volume) => add_values(&mut hash, volume),
+        OpenVolume::Streamed(volume) => _ = hash.update(volume.store.identity().as_bytes()),
+    }
+    Ok(hash.finalize().to_hex().to_string())
+}
+
+/// Hashes values, labels and colours, in blocks, because the hash is fastest over long slices.
+fn add_values(hash: &mut blake3::Hasher, volume: &Volume) {
     for channel in volume.channels() {
         for values in channel.values().chunks(1 << 14) {
             let bytes: Vec<u8> = values.iter().flat_map(|value| bits(*value).to_le_bytes()).collect();
@@ -42,7 +51,6 @@ pub(super) fn fingerprint(volume: &Volume, scene: &Scene) -> Result<String, Scen
             hash.update(&bytes);
         }
     }
-    Ok(hash.finalize().to_hex().to_string())
 }
 
 /// The bits of a value; all holes are alike, and so are both zeros.

@@ -48,7 +48,7 @@ use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::channels::Joining;
-use crate::scene::Scene;
+use crate::scene::{OpenVolume, Scene};
 use crate::settings::splatting::{Classification, Compositing, Method, Order};
 use crate::settings::window::Window;
 use crate::volume::Volume;
@@ -70,7 +70,8 @@ pub struct Part {
 /// What the parts of one image have in common.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Identity {
-    /// A hash of everything that bears on the image, the volume's values included, in hexadecimal digits; not of paths, nor of what draws.
+    /// A hash of everything that bears on the image, in hexadecimal digits: the volume's values, or if it is streamed, what identifies the store's; not paths,
+    /// nor what draws.
     pub fingerprint: String,
     /// Width and height of the whole image.
     pub size: [u32; 2],
@@ -89,7 +90,7 @@ pub struct Identity {
 impl Part {
     /// A part that a backend has drawn.
     pub(crate) fn new(
-        (volume, scene): (&Volume, &Scene),
+        (volume, scene): (&OpenVolume, &Scene),
         view: &ViewGeometry,
         window: &Window,
         content: Content,
@@ -100,7 +101,7 @@ impl Part {
             size: view.size,
             slabs: view.slabs_of(volume.grid()),
             compositing: scene.splatting.compositing,
-            classification: scene.classification(volume),
+            classification: scene.classification(volume.sample()),
             order: scene.splatting.order,
             background: scene.image.background,
         };

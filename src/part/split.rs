@@ -8,9 +8,8 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::kernel::Kernel;
 use crate::lists::brick::{self, Brick, BrickList};
 use crate::lists::classify::classify;
-use crate::scene::Scene;
+use crate::scene::{OpenVolume, Scene};
 use crate::settings::window::{Region, Window};
-use crate::volume::Volume;
 
 /// The maximum number of cells along a side of the image, and of bins along the depth, in which work is counted.
 const CELLS: u32 = 64;
@@ -21,9 +20,9 @@ const BINS: usize = 1024;
 ///
 /// # Errors
 /// If the scene has no parts, or fewer slabs and pixels than parts are asked for.
-pub fn split(volume: &Volume, scene: &Scene, parts: usize) -> Result<Vec<Window>, RenderError> {
+pub fn split(volume: &OpenVolume, scene: &Scene, parts: usize) -> Result<Vec<Window>, RenderError> {
     let size = [scene.image.width, scene.image.height];
-    super::check(volume, scene, &Window::whole(size))?;
+    super::check(volume.sample(), scene, &Window::whole(size))?;
     let work = Work::new(volume, scene)?;
     // As many regions as slab ranges in each of them: ranges divide the volume's memory, regions keep what hides.
     let regions = parts.isqrt().max(1);
@@ -63,12 +62,14 @@ struct Area {
 }
 
 impl Work {
-    fn new(volume: &Volume, scene: &Scene) -> Result<Self, RenderError> {
+    fn new(volume: &OpenVolume, scene: &Scene) -> Result<Self, RenderError> {
+        let (grid, volume) = (volume.grid(), volume.sample());
         let transfer = scene.resolve(volume);
         let scene = scene.framed(volume, &transfer);
         let size = [scene.image.width, scene.image.height];
+        let slabs = ViewGeometry::new(grid, &scene.camera, &scene.splatting, size)?.slabs_of(grid);
+        // A sample's voxels share the place and the slabs of those that they stand for.
         let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, size)?;
-        let slabs = view.slabs_of(volume.grid());
         let cell = size[0].max(size[1]).div_ceil(CELLS).max(1);
         let cells = size.map(|side| side.div_ceil(cell) as usize);
         let bins = slabs.len().clamp(1, BINS);

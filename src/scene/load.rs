@@ -4,9 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{Channel, Scene, VolumeSource};
-use crate::volume::{
-    Access, Labels, ReadOptions, Selection, Store, Volume, VolumeError, builtin, open_raw_store, open_store,
-};
+use crate::volume::{self, Access, Labels, Selection, Store, Volume, VolumeError, builtin, raw_store};
 
 /// The scene's volume with all channels, on the first one's grid.
 pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeError> {
@@ -29,22 +27,22 @@ pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeE
 }
 
 /// The scene's volume to be read by boxes; `None` if it has several channels, labels or a spacing of the scene's, or is no file.
-pub(super) fn store(scene: &Scene, options: &ReadOptions) -> Option<Result<Arc<dyn Store>, VolumeError>> {
+pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Store>, VolumeError>> {
     let mut channels = scene.channels();
     let (first, None) = (channels.next()?, channels.next()) else { return None };
     if first.labels.is_some() || first.spacing.is_some() {
         return None;
     }
-    let options = ReadOptions { channel: first.index, time: first.time, ..options.clone() };
+    let access = access.selecting(Selection { channel: first.index, time: first.time, level: None });
     match &first.volume {
-        VolumeSource::File(path) => Some(open_store(path, &options)),
-        VolumeSource::Raw(path, layout) => Some(open_raw_store(path, layout, &options)),
+        VolumeSource::File(path) => Some(volume::store(path, &access)),
+        VolumeSource::Raw(path, layout) => Some(raw_store(path, layout, &access)),
         VolumeSource::Builtin(_) | VolumeSource::Memory => None,
     }
 }
 
 /// Where a volume comes from, for errors.
-fn origin(source: &VolumeSource) -> String {
+pub(super) fn origin(source: &VolumeSource) -> String {
     match source {
         VolumeSource::File(path) | VolumeSource::Raw(path, _) => path.display().to_string(),
         VolumeSource::Builtin(name) => format!("builtin:{name}"),

@@ -5,6 +5,7 @@ mod check;
 mod level;
 mod load;
 pub(crate) mod names;
+mod open;
 mod reader;
 mod tables;
 mod writer;
@@ -27,6 +28,7 @@ use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::{Access, RawLayout, ReadOptions, Store, Volume, VolumeError};
 pub use channel::Channel;
+pub use open::OpenVolume;
 use reader::{OVERRIDE, Origins, Section, apply_override};
 
 /// Why a scene could not be read.
@@ -335,7 +337,10 @@ impl Scene {
 
     /// Opens the scene's volume to be read by boxes (SPEC §13), if it is one file without labels or a spacing of the scene's; `None` for any other.
     pub fn open_store(&self, options: &ReadOptions) -> Option<Result<Arc<dyn Store>, VolumeError>> {
-        load::store(self, options)
+        match Access::new(options) {
+            Ok(access) => load::store(self, &access),
+            Err(error) => Some(Err(error)),
+        }
     }
 
     /// The same scene with everything stated that depends on the volume: the transfer function, the camera's position and the level. Preset and colour

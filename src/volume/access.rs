@@ -88,6 +88,14 @@ impl ReadOptions {
         self.memory.unwrap_or_else(memory::default_limit)
     }
 
+    /// The bytes of a memory limit as text: a number, alone or with a unit, as in `2GiB`.
+    ///
+    /// # Errors
+    /// If it is no such text; the error tells what is allowed.
+    pub fn parse_memory(text: &str) -> Result<u64, String> {
+        memory::parse_size(text)
+    }
+
     /// These options with another memory limit in bytes.
     pub fn with_memory(self, bytes: u64) -> Self {
         Self { memory: Some(bytes), ..self }

@@ -213,6 +213,10 @@ impl Store for IndexedStore {
         ranges.get((chunk.x + chunks.x * (chunk.y + chunks.y * chunk.z)) as usize).copied()
     }
 
+    fn times(&self) -> u32 {
+        self.store.times()
+    }
+
     fn identity(&self) -> String {
         self.store.identity()
     }

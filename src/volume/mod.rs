@@ -42,6 +42,7 @@ mod series;
 mod shear;
 mod source;
 mod store;
+mod streamed;
 #[cfg(feature = "tiff")]
 mod tiff;
 mod unit;
@@ -55,7 +56,7 @@ mod zarr;
 mod zip;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
@@ -81,44 +82,12 @@ pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 pub(crate) use series::Selection;
 pub use store::{Store, StoreLevel, open_raw_store, open_store};
+pub(crate) use store::{raw_store, store};
+pub use streamed::StreamedVolume;
 
 use crate::error::setting::SettingError;
+pub use crate::error::volume::VolumeError;
 use crate::stats::StoreCounts;
-
-/// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is allowed.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum VolumeError {
-    /// The file could not be opened or read.
-    #[error("{}: {source}", path.display())]
-    #[non_exhaustive]
-    Io {
-        /// The file.
-        path: PathBuf,
-        /// The operating system's error.
-        source: std::io::Error,
-    },
-    /// A header field, or the data it promises, is invalid.
-    #[error("{origin}: {field}: found {found}, allowed: {allowed}")]
-    #[non_exhaustive]
-    Invalid {
-        /// The file, or `builtin:NAME`.
-        origin: String,
-        /// The header field or the part of the file (`sizes`, `space directions`, `data`).
-        field: String,
-        /// What was found there.
-        found: String,
-        /// What would have been accepted.
-        allowed: String,
-    },
-}
-
-impl VolumeError {
-    /// The error of a file that could not be read, for [`Store`]s of other programs.
-    pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
-        Self::Io { path: path.into(), source }
-    }
-}
 
 /// How a file stores a volume.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -164,6 +164,10 @@ impl Store for FileStore {
         f32::NAN
     }
 
+    fn times(&self) -> u32 {
+        self.located.series.times
+    }
+
     fn identity(&self) -> String {
         self.identity.clone()
     }

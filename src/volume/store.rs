@@ -49,6 +49,11 @@ pub trait Store: Send + Sync + Debug {
         None
     }
 
+    /// The number of times in the file, of which the store is one.
+    fn times(&self) -> u32 {
+        1
+    }
+
     /// A hash, as hexadecimal digits, of what identifies the store's values: its metadata, never paths or times.
     fn identity(&self) -> String;
 }
@@ -75,7 +80,12 @@ impl StoreLevel {
 /// If the file cannot be read, is of no such format, holds several channels of which none is chosen, or needs more memory than
 /// [`ReadOptions::memory`] allows for the chunks that are read at once.
 pub fn open_store(path: &Path, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
-    format::open_store(path, &Access::new(options)?)
+    store(path, &Access::new(options)?)
+}
+
+/// As [`open_store`].
+pub(crate) fn store(path: &Path, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
+    format::open_store(path, access)
 }
 
 /// Opens a file of samples without a header to be read by boxes.
@@ -83,8 +93,12 @@ pub fn open_store(path: &Path, options: &ReadOptions) -> Result<Arc<dyn Store>, 
 /// # Errors
 /// If the file cannot be read, or is shorter than its layout says.
 pub fn open_raw_store(path: &Path, layout: &RawLayout, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
+    raw_store(path, layout, &Access::new(options)?)
+}
+
+/// As [`open_raw_store`].
+pub(crate) fn raw_store(path: &Path, layout: &RawLayout, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
     let &RawLayout { dims, sample_type: kind, big_endian, offset: at } = layout;
-    let access = Access::new(options)?;
     let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
     dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?;
     let mut file = access.open(path)?;
@@ -94,7 +108,7 @@ pub fn open_raw_store(path: &Path, layout: &RawLayout, options: &ReadOptions) ->
         return Err(samples.mismatch(path, left));
     }
     let located = Located { path: path.to_owned(), at, samples, series: Series::default() };
-    Ok(Arc::new(FileStore::new(located, DVec3::ONE, &access)?))
+    Ok(Arc::new(FileStore::new(located, DVec3::ONE, access)?))
 }
 
 /// Checks that a box lies in a level, and that there is a value for each of its voxels.

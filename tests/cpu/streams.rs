@@ -4,13 +4,16 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 
 use glam::{DVec3, UVec3};
-use sheetsplat::Scene;
 use sheetsplat::cpu::{CpuRenderer, StreamRenderer};
+use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
 use sheetsplat::scene::ImageSettings;
 use sheetsplat::scene::VolumeSource;
-use sheetsplat::settings::Classification;
+use sheetsplat::settings::{Classification, Region, Window};
 use sheetsplat::stats::StoreCounts;
-use sheetsplat::volume::{Grid, IndexedStore, Labels, Store, StoreIndex, StoreLevel, Volume, VolumeError};
+use sheetsplat::volume::{
+    Grid, IndexedStore, Labels, Store, StoreIndex, StoreLevel, StreamedVolume, Volume, VolumeError,
+};
+use sheetsplat::{Image, RenderError, Scene};
 
 use crate::common::compare::assert_at_least;
 use crate::common::images::psnr;
@@ -120,12 +123,23 @@ fn values(scene: &Scene) -> Volume {
     Volume::new("head", volume.dims(), volume.spacing(), volume.values().to_vec()).unwrap()
 }
 
+/// A level of a store in a scene, for which all that depends on values is chosen by a sample.
+fn renderer(
+    store: Arc<dyn Store>,
+    level: usize,
+    sample: &Volume,
+    scene: &Scene,
+    memory: u64,
+) -> Result<StreamRenderer, RenderError> {
+    StreamRenderer::new(StreamedVolume { store, level, sample: Arc::new(sample.clone()), memory }, scene)
+}
+
 /// Draws a store and asserts that the image and the work are those of the volume in memory.
 fn assert_same(volume: &Volume, scene: &Scene, chunk: UVec3, memory: u64) -> StoreCounts {
     let name = format!("{chunk} {memory} {scene:?}");
     let whole = CpuRenderer::new(volume.clone(), scene).unwrap().draw().unwrap();
     let store = Arc::new(MemoryStore::new(volume, chunk));
-    let renderer = StreamRenderer::new(store, 0, volume, scene, memory).unwrap();
+    let renderer = renderer(store, 0, volume, scene, memory).unwrap();
     let streamed = renderer.draw().unwrap();
     assert!(streamed.image.pixels.as_flattened().iter().all(|channel| channel.is_finite()), "{name}");
     let background = whole.image.pixels[0];
@@ -233,7 +247,7 @@ fn an_index_spares_chunks_and_tells_the_range() {
         let scene = scene(&[transfer, "camera.direction=[0.3,-0.5,0.8]", "camera.fit=volume", &classification]);
         let whole = CpuRenderer::new(volume.clone(), &scene).unwrap().draw().unwrap();
         let draw = |store: Arc<dyn Store>| {
-            let streamed = StreamRenderer::new(store, 0, &volume, &scene, 1 << 30).unwrap().draw().unwrap();
+            let streamed = renderer(store, 0, &volume, &scene, 1 << 30).unwrap().draw().unwrap();
             (streamed.image, streamed.stats.store.unwrap().chunks_read)
         };
         let indexed = Arc::new(IndexedStore::new(store(), index.clone(), "index").unwrap());
@@ -260,15 +274,15 @@ fn failures_are_errors() {
     let volume = values(&scene);
     let store = MemoryStore { broken_from: Some(30), ..MemoryStore::new(&volume, UVec3::splat(16)) };
     let store = Arc::new(store);
-    let renderer = StreamRenderer::new(store.clone(), 0, &volume, &scene, 1 << 30).unwrap();
-    assert_eq!(renderer.draw().unwrap_err().to_string(), "store: the disk is gone");
-    let error = StreamRenderer::new(store.clone(), 1, &volume, &scene, 1 << 30).unwrap_err();
+    let broken = renderer(store.clone(), 0, &volume, &scene, 1 << 30).unwrap();
+    assert_eq!(broken.draw().unwrap_err().to_string(), "store: the disk is gone");
+    let error = renderer(store.clone(), 1, &volume, &scene, 1 << 30).unwrap_err();
     assert_eq!(error.to_string(), "volume.level: found 1, allowed: 0 to 0");
     let mut small = Scene { image: ImageSettings { width: 1, height: 1, ..scene.image }, ..scene.clone() };
     small.splatting.classification = Classification::After;
     let large =
         Arc::new(LargeStore([StoreLevel { grid: Grid::new(UVec3::splat(1024), DVec3::ONE), chunk: UVec3::splat(64) }]));
-    let error = StreamRenderer::new(large, 0, &volume, &small, 1 << 24).unwrap().draw().unwrap_err().to_string();
+    let error = renderer(large, 0, &volume, &small, 1 << 24).unwrap().draw().unwrap_err().to_string();
     assert!(error.starts_with("volume.level: found 0, in which 32×32 pixels see a box of voxels of "), "{error}");
     let labels = Labels {
         origin: "labels".to_owned(),
@@ -278,11 +292,11 @@ fn failures_are_errors() {
         names: BTreeMap::new(),
     };
     let labelled = volume.clone().with_labels(labels).unwrap();
-    let error = StreamRenderer::new(store.clone(), 0, &labelled, &scene, 1 << 30).unwrap_err().to_string();
+    let error = renderer(store.clone(), 0, &labelled, &scene, 1 << 30).unwrap_err().to_string();
     assert!(error.starts_with("volume: found labels of a volume that is streamed"), "{error}");
     for chunk in [UVec3::ZERO, UVec3::new(1, 0, 1)] {
         let empty = Arc::new(MemoryStore::new(&volume, chunk));
-        let error = StreamRenderer::new(empty, 0, &volume, &scene, 1 << 30).unwrap_err().to_string();
+        let error = renderer(empty, 0, &volume, &scene, 1 << 30).unwrap_err().to_string();
         assert!(error.starts_with("volume: found chunks of [") && error.contains("at least 1"), "{error}");
     }
     for (set, expected) in [
@@ -293,7 +307,7 @@ fn failures_are_errors() {
         ("splatting.method=composite-every-sample", "splatting.method: found \"composite-every-sample\""),
     ] {
         let scene = Scene::from_volume(scene.volume.clone(), &[set.to_owned()]).unwrap();
-        let error = StreamRenderer::new(store.clone(), 0, &volume, &scene, 1 << 30).unwrap_err().to_string();
+        let error = renderer(store.clone(), 0, &volume, &scene, 1 << 30).unwrap_err().to_string();
         assert!(error.starts_with(expected), "{error}");
     }
 }
@@ -342,7 +356,7 @@ fn stores_of_unknown_range_are_the_volume_in_memory_to_rounding() {
         // Its greatest value is a third of the volume's.
         let dim = volume.values().iter().map(|value| value / 3.0).collect();
         let sample = Volume::new("sample", volume.dims(), volume.spacing(), dim).unwrap();
-        let streamed = StreamRenderer::new(store, 0, &sample, &scene, 1 << 30).unwrap().draw().unwrap().image;
+        let streamed = renderer(store, 0, &sample, &scene, 1 << 30).unwrap().draw().unwrap().image;
         let background = [0.2, 0.4, 0.1, 0.5];
         assert_at_least(psnr(&streamed.pixels, &whole.pixels, background, 1000), 100.0, compositing);
     }
@@ -361,7 +375,7 @@ fn threads_change_nothing_in(scene: &Scene) {
     let volume = values(scene);
     let draw = |threads: usize| {
         let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(16)));
-        let renderer = StreamRenderer::new(store, 0, &volume, scene, 1 << 18).unwrap();
+        let renderer = renderer(store, 0, &volume, scene, 1 << 18).unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let rendering = pool.install(|| renderer.draw()).unwrap();
         let counts = rendering.stats.store.unwrap();
@@ -371,4 +385,74 @@ fn threads_change_nothing_in(scene: &Scene) {
     for threads in [2, 5] {
         assert!(draw(threads) == first, "{threads} threads: {:?}", scene.splatting);
     }
+}
+
+/// Parts of a volume that is streamed have the pixels of the same parts of one in memory, merge, and need fewer chunks than the whole image.
+#[test]
+fn parts_of_streams_are_those_of_the_volume_in_memory() {
+    for (classification, compositing) in
+        [("before", "linear"), ("before", "surface"), ("after", "exponential"), ("after", "maximum")]
+    {
+        let scene = scene(&[
+            &format!(
+                "splatting={{classification=\"{classification}\",compositing=\"{compositing}\",opacity_threshold=1}}"
+            ),
+            "camera.direction=[0.3,-0.5,0.8]",
+        ]);
+        let volume = values(&scene);
+        let store = || Arc::new(MemoryStore::new(&volume, UVec3::splat(16)));
+        let streamed = renderer(store(), 0, &volume, &scene, 1 << 18).unwrap();
+        let mut whole = CpuRenderer::new(volume.clone(), &scene).unwrap();
+        let all = streamed.draw().unwrap();
+        let total = all.stats.store.unwrap().chunks_read;
+        let mut parts = Vec::new();
+        for slabs in [-1000..-9, -9..14, 14..1000] {
+            for region in [(0, 0, 101, 40), (0, 40, 64, 43), (64, 40, 37, 43)] {
+                let (x, y, width, height) = region;
+                let window = Window { slabs: slabs.clone(), region: Region { x, y, width, height } };
+                let (part, stats) = streamed.draw_part(&window).unwrap();
+                let expected = whole.draw_part(&window).unwrap().0;
+                assert!(part.content == expected.content, "{classification} {compositing} {window:?}");
+                assert_ne!(part.identity.fingerprint, expected.identity.fingerprint);
+                let StoreCounts { chunks_read, chunks_total, .. } = stats.store.unwrap();
+                // What the first slabs hide of later ones is drawn in parts.
+                let most = if window.slabs.start == -1000 { total } else { chunks_total };
+                assert!(chunks_read < most, "{chunks_read} of {most}: {classification} {compositing} {window:?}");
+                parts.push(part);
+            }
+        }
+        let merged = Image::merge(parts).unwrap();
+        let difference = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).map(|at| (a[at] - b[at]).abs()).fold(0.0, f32::max);
+        let largest = merged.pixels.iter().zip(&all.image.pixels).map(difference).fold(0.0, f32::max);
+        assert!(largest <= 1e-6, "{largest}: {classification} {compositing}");
+    }
+}
+
+/// What opens a volume may leave it to be read while it is drawn.
+#[test]
+fn headless_views_are_streamed() {
+    let scene = scene(&["camera.direction=[0.3,-0.5,0.8]"]);
+    let volume = values(&scene);
+    let store: Arc<dyn Store> = Arc::new(MemoryStore::new(&volume, UVec3::splat(16)));
+    let streamed = StreamedVolume { store, level: 0, sample: Arc::new(volume.clone()), memory: 1 << 20 };
+    let headless = |backend| Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap();
+    let cpu = headless(Backend::Cpu);
+    let mut view = cpu.view(streamed.clone(), &scene).unwrap();
+    let mut whole = cpu.view(volume, &scene).unwrap();
+    let mut other = scene.clone();
+    other.shading.ambient = 0.7;
+    for scene in [&scene, &other] {
+        for view in [&mut view, &mut whole] {
+            cpu.set_scene(view, scene).unwrap();
+            view.turn(30.0).unwrap();
+        }
+        let drawn = cpu.draw(&mut view).unwrap();
+        assert!(drawn.image == cpu.draw(&mut whole).unwrap().image);
+        assert!(drawn.stats.store.unwrap().chunks_read > 0);
+    }
+    let error = view.set_first_hit(Some(0.5)).unwrap_err().to_string();
+    assert!(error.starts_with("first_hit: found first hits of a volume that is streamed"), "{error}");
+    assert!(cpu.pick(&view, [0, 0]).is_err());
+    let error = headless(Backend::Reference).view(streamed, &scene).unwrap_err().to_string();
+    assert!(error.starts_with("volume: found a volume that is streamed, with the reference backend"), "{error}");
 }

@@ -14,7 +14,7 @@ use crate::merging::{head, headless};
 fn windows_cover_all_once() {
     let (volume, scene) = head(32, [70, 41]);
     for count in [1, 2, 3, 7, 16, 64] {
-        let windows = part::split(&volume, &scene, count).unwrap();
+        let windows = part::split(&Arc::clone(&volume).into(), &scene, count).unwrap();
         assert_eq!(windows.len(), count);
         let first = windows.iter().map(|window| window.slabs.start).min().unwrap();
         let end = windows.iter().map(|window| window.slabs.end).max().unwrap();
@@ -32,7 +32,7 @@ fn windows_cover_all_once() {
             assert_eq!(next, end, "{count}: {x}, {y}");
         }
     }
-    let error = part::split(&volume, &scene, 60_000).unwrap_err().to_string();
+    let error = part::split(&Arc::clone(&volume).into(), &scene, 60_000).unwrap_err().to_string();
     assert!(error.starts_with("parts: found 60000, allowed: at most "), "{error}");
 }
 
@@ -47,7 +47,7 @@ fn windows_have_equal_work() {
     let mut view = headless.view(Arc::clone(&volume), &scene).unwrap();
     let mut parts = Vec::new();
     let mut work = Vec::new();
-    for window in part::split(&volume, &scene, 16).unwrap() {
+    for window in part::split(&Arc::clone(&volume).into(), &scene, 16).unwrap() {
         let (part, stats) = headless.draw_part(&mut view, &window).unwrap();
         work.push(stats.counts.sections_rasterized as f64);
         parts.push(part);

@@ -10,9 +10,9 @@ use sheetsplat::RenderError;
 use sheetsplat::appearance::{Colormap, Preset};
 use sheetsplat::headless::{Backend, Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
-use sheetsplat::scene::{Scene, SceneError, VolumeSource};
+use sheetsplat::scene::{OpenVolume, Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
-use sheetsplat::volume::{self, Orientation, Volume};
+use sheetsplat::volume::{self, Orientation, StreamedVolume, Volume};
 
 use crate::failure::Failure;
 use crate::outputs::Outputs;
@@ -203,10 +203,31 @@ impl Input {
         Ok(chosen)
     }
 
-    /// Loads the scene's volume, from files that are not outputs.
-    pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
+    /// Opens the scene's volume, from files that are not outputs: loads it, or if it fits into no memory and can be read by boxes, a sample of it.
+    pub(crate) fn open_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<OpenVolume, Failure> {
         let start = Instant::now();
         let volume = self.read_volume(scene, outputs)?;
+        match &volume {
+            OpenVolume::Whole(volume) => self.log_volume(volume, start),
+            OpenVolume::Streamed(StreamedVolume { sample, .. }) => {
+                let (name, dims) = (&self.name, volume.grid().dims);
+                log::info!("{name}: {dims} voxels, a sample of {} read in {:.1?}", sample.dims(), start.elapsed());
+            }
+        }
+        Ok(volume)
+    }
+
+    /// Loads the scene's volume, which must fit into memory, from files that are not outputs.
+    pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
+        let start = Instant::now();
+        let loaded = scene.load_volume_and_files(&self.reading.options());
+        let (volume, files) = loaded.map_err(|error| self.failure(error))?;
+        outputs.refuse(&files)?;
+        self.log_volume(&volume, start);
+        Ok(volume)
+    }
+
+    fn log_volume(&self, volume: &Volume, start: Instant) {
         log::info!("{}: {} voxels, loaded in {:.1?}", self.name, volume.grid().dims, start.elapsed());
         let (holes, samples) = (volume.holes(), volume.values().len());
         if holes > 0 {
@@ -216,13 +237,12 @@ impl Input {
             let name = &self.name;
             log::warn!("{name}: --view: the axes are left-handed, so the image is a mirror image of the patient");
         }
-        Ok(volume)
     }
 
-    /// Loads the volume without logging anything.
-    pub(crate) fn read_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
-        let loaded = scene.load_volume_and_files(&self.reading.options());
-        let (volume, files) = loaded.map_err(|error| self.failure(error))?;
+    /// Opens the volume without logging anything.
+    pub(crate) fn read_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<OpenVolume, Failure> {
+        let opened = scene.open_volume_and_files(&self.reading.options());
+        let (volume, files) = opened.map_err(|error| self.failure(error))?;
         outputs.refuse(&files)?;
         Ok(volume)
     }

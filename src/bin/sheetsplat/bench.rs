@@ -46,9 +46,9 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     let start = Instant::now();
     let scene = input.choose_levels(&scene, Scene::explicit_all_around)?;
-    let volume = input.load_volume(&scene, &outputs)?;
+    let volume = input.open_volume(&scene, &outputs)?;
     let load_ms = milliseconds_since(start);
-    let scene = input.settled(&volume, &scene, Scene::explicit_all_around)?;
+    let scene = input.settled(volume.sample(), &scene, Scene::explicit_all_around)?;
 
     let start = Instant::now();
     let headless = input.headless(arguments.profile, [&scene])?;

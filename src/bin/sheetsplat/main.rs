@@ -18,7 +18,6 @@ mod parts;
 mod progress;
 mod reading;
 mod render;
-mod streaming;
 mod sweep;
 #[cfg(feature = "viewer")]
 mod view;

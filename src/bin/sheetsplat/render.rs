@@ -1,19 +1,18 @@
 //! `sheetsplat render`.
 
-use std::path::PathBuf;
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
-use sheetsplat::scene::Scene;
+use sheetsplat::scene::{OpenVolume, Scene};
+use sheetsplat::volume::StoreIndex;
 
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
 use crate::parts::Part;
-use crate::streaming::Streamed;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -70,34 +69,21 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let outputs = Outputs::check(&named, arguments.profile, &files)?;
     let start = Instant::now();
     let scene = input.choose_levels(&scene, Scene::explicit)?;
-    let streamed = Streamed::of(input, &scene).map(|streamed| streamed.indexed(input, index.as_deref())).transpose()?;
-    let volume = match &streamed {
-        Some(streamed) => streamed.sample(input)?,
-        None => input.load_volume(&scene, &outputs)?,
-    };
+    let volume = input.open_volume(&scene, &outputs)?;
+    let volume = index.as_deref().map_or(Ok(volume.clone()), |index| indexed(input, volume, index))?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     let start = Instant::now();
-    let scene = input.settled(&volume, &scene, Scene::explicit)?;
+    let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
-    let overlay = arguments.annotate.overlay(&scene, &volume)?;
-    let volume = Arc::new(volume);
+    let overlay = arguments.annotate.overlay(&scene, volume.sample())?;
     let (bytes, mut stats) = match arguments.part.window(&scene) {
-        Some(_) if streamed.is_some() => {
-            let allowed = "whole images of a volume that fits into no memory, or more --memory";
-            return Err(Failure::Input(format!("--slabs, --region: found a part of an image, allowed: {allowed}")));
-        }
         Some(window) => {
             let (part, stats) = arguments.part.draw(input, volume, &scene, &window)?;
             (part.encode(output)?, stats)
         }
         None => {
-            let Rendering { mut image, stats } = match &streamed {
-                Some(streamed) => streamed.draw(input, &volume, &scene)?,
-                None => {
-                    let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume, &scene);
-                    rendering.map_err(|error| input.failure(error))?
-                }
-            };
+            let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume, &scene);
+            let Rendering { mut image, stats } = rendering.map_err(|error| input.failure(error))?;
             overlay.draw(&mut image);
             (image.encode(output, arguments.depth.into())?, stats)
         }
@@ -119,6 +105,16 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // The map is empty without --profile.
     let profile: String = stats.stages_ms.iter().map(|(stage, ms)| format!("{stage:10} {ms:10.3} ms\n")).collect();
     outputs::write(&files, profile.as_bytes())
+}
+
+/// The volume with the index in a file, if it is streamed; one in memory needs none.
+fn indexed(input: &Input, volume: OpenVolume, path: &Path) -> Result<OpenVolume, Failure> {
+    let OpenVolume::Streamed(volume) = volume else { return Ok(volume) };
+    let origin = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|error| Failure::Input(format!("{origin}: {error}")))?;
+    let index = StoreIndex::decode(&origin, &text);
+    let volume = index.and_then(|index| volume.with_index(index, &origin));
+    Ok(volume.map_err(|error| input.failure(error))?.into())
 }
 
 /// Checks the extensions of the files to be written.

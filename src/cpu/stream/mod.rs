@@ -20,7 +20,7 @@ use crate::volume::Grid;
 use crate::volume::range::{EMPTY, union};
 pub(super) use chunk::Chunk;
 use pool::Pool;
-pub use renderer::{StreamError, StreamRenderer};
+pub use renderer::StreamRenderer;
 use source::Source;
 
 /// A store in a view.

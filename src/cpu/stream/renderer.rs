@@ -1,4 +1,4 @@
-//! A view of a store.
+//! A view of a volume that is read while it is drawn.
 
 use std::sync::Arc;
 
@@ -21,15 +21,17 @@ use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::kernel::Kernel;
+use crate::part::{self, Content, Part};
 use crate::rendering::Rendering;
 use crate::scene::Scene;
 use crate::scene::names::{METHODS, name_of};
+use crate::settings::camera::Camera;
 use crate::settings::splatting::{Classification, Interpolation, Method};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
 use crate::volume::range::range_of;
-use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
+use crate::volume::{Grid, StoreLevel, StreamedVolume, Volume};
 
 /// The minimum number of threads that read: a server, or a disk, answers several requests in the time of one.
 const LEAST_READERS: usize = 8;
@@ -38,77 +40,62 @@ const LEAST_READERS: usize = 8;
 const MOST_AHEAD: u64 = 16;
 
 /// Bytes that boxes of voxels may take however little memory chunks may.
-const LEAST_HELD: usize = 64 << 20;
+const LEAST_HELD: u64 = 64 << 20;
 
-/// Why a store could not be drawn.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum StreamError {
-    /// The store could not be read.
-    #[error(transparent)]
-    Volume(#[from] VolumeError),
-    /// The scene cannot be drawn.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-}
-
-impl From<SettingError> for StreamError {
-    fn from(error: SettingError) -> Self {
-        Self::Render(error.into())
-    }
-}
-
-/// A view of a store that is drawn on the CPU without being in memory as a whole.
+/// A view of a volume that is drawn on the CPU while it is read.
 #[derive(Clone, Debug)]
 pub struct StreamRenderer {
-    store: Arc<dyn Store>,
-    level: usize,
+    volume: StreamedVolume,
     scene: Scene,
     transfer: TransferFunction,
     /// The minimum and maximum of the sample's values; `None` if all are holes.
     sampled: Option<[f32; 2]>,
-    /// The bytes that chunks may hold.
-    memory: usize,
     simd: Simd,
-    vectors: Level,
+    level: Level,
 }
 
 impl StreamRenderer {
-    /// Prepares a level of a store to be drawn in a scene, whose own volume is ignored. What the scene leaves open, such as the transfer function and
-    /// the camera's frame, is chosen for a sample of the values: a coarser level, or a subset of the voxels, with the same box. Chunks may hold
-    /// `memory` bytes together, beyond which those are dropped and read again that no tile is drawn from.
+    /// Prepares a volume to be drawn in a scene, whose own volume is ignored. What the scene leaves open, such as the transfer function and
+    /// the camera's frame, is chosen for the volume's sample.
     ///
     /// # Errors
     /// If the store has no such level, or its chunks are too many or too large; if the scene has several channels, or the sample has labels, colours or
     /// several channels; or if a setting is not supported: exact interpolation, and methods other than image-aligned.
-    pub fn new(
-        store: Arc<dyn Store>,
-        level: usize,
-        sample: &Volume,
-        scene: &Scene,
-        memory: u64,
-    ) -> Result<Self, StreamError> {
-        scene.check()?;
-        scene.check_volume(sample)?;
-        check(scene)?;
-        let levels = store.levels().len();
-        if level >= levels {
-            return Err(SettingError::new("volume.level", level.to_string(), format!("0 to {}", levels - 1)).into());
+    pub fn new(volume: StreamedVolume, scene: &Scene) -> Result<Self, RenderError> {
+        let levels = volume.store.levels().len();
+        if volume.level >= levels {
+            let allowed = format!("0 to {}", levels - 1);
+            return Err(SettingError::new("volume.level", volume.level.to_string(), allowed).into());
         }
-        check_sample(sample, scene)?;
-        Source::check(&store.levels()[level])?;
-        let (simd, vectors) = simd::chosen()?;
-        let transfer = scene.resolve(sample);
-        let scene = scene.framed(sample, &transfer);
-        check_streamed(&scene)?;
-        let sampled = range_of(sample.values().iter().copied());
-        let memory = usize::try_from(memory).unwrap_or(usize::MAX);
-        Ok(Self { store, level, scene, transfer, sampled, memory, simd, vectors })
+        Source::check(&volume.store.levels()[volume.level])?;
+        let (simd, level) = simd::chosen()?;
+        let (scene, transfer) = settled(&volume.sample, scene)?;
+        let sampled = range_of(volume.sample.values().iter().copied());
+        Ok(Self { volume, scene, transfer, sampled, simd, level })
     }
 
-    /// The settings, with what the sample decided.
+    /// The settings.
     pub fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Changes the scene, whose own volume is ignored.
+    ///
+    /// # Errors
+    /// As for [`Self::new`]; then nothing changes.
+    pub fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
+        (self.scene, self.transfer) = settled(&self.volume.sample, scene)?;
+        Ok(())
+    }
+
+    /// Changes the camera.
+    ///
+    /// # Errors
+    /// If a setting is not allowed; then nothing changes.
+    pub fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
+        camera.check()?;
+        self.scene.camera = camera;
+        Ok(())
     }
 
     /// Draws a frame on the threads of the current rayon pool, while others read. Neither their number nor the memory changes a bit of the
@@ -116,14 +103,48 @@ impl StreamRenderer {
     ///
     /// # Errors
     /// If the store cannot be read, or the scene exceeds a limit, such as the number of slabs.
-    pub fn draw(&self) -> Result<Rendering, StreamError> {
+    pub fn draw(&self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        let (scene, grid) = (&self.scene, self.store.levels()[self.level].grid);
-        let size = [scene.image.width, scene.image.height];
-        let view = ViewGeometry::new(&grid, &scene.camera, &scene.splatting, size)?;
+        let (scene, view) = self.view()?;
+        let size = view.size;
         let window = Window { slabs: Window::ALL_SLABS, region: Region::whole(size) };
-        let stream = Arc::new(self.stream(view, &window)?);
-        let host = Host { window, is_part: false, first_hit: None, surfaces: None };
+        let (content, stats) = self.drawing(&scene, (view, window, false), start)?;
+        let image = Image { width: size[0], height: size[1], pixels: content.colors };
+        Ok(Rendering { image, stats })
+    }
+
+    /// Draws a part of the image (SPEC §11), and returns it with its statistics. Only chunks are read that matter to it.
+    ///
+    /// # Errors
+    /// As for [`Self::draw`], if the scene has no parts, or the window does not lie in the image.
+    pub fn draw_part(&self, window: &Window) -> Result<(Part, Stats), RenderError> {
+        let start = Instant::now();
+        part::check(&self.volume.sample, &self.scene, window)?;
+        let (scene, view) = self.view()?;
+        let opened = window.opened(&view.slabs_of(self.volume.grid()));
+        let (content, stats) = self.drawing(&scene, (view, opened, true), start)?;
+        let part = Part::new((&self.volume.clone().into(), &self.scene), &view, window, content)?;
+        Ok((part, stats))
+    }
+
+    /// The scene with its frame, and its view.
+    fn view(&self) -> Result<(Scene, ViewGeometry), RenderError> {
+        let scene = self.scene.framed(&self.volume.sample, &self.transfer);
+        let size = [scene.image.width, scene.image.height];
+        let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, size)?;
+        Ok((scene, view))
+    }
+
+    /// Draws a window of the image, as pixels or as a part.
+    fn drawing(
+        &self,
+        scene: &Scene,
+        (view, window, is_part): (ViewGeometry, Window, bool),
+        start: Instant,
+    ) -> Result<(Content, Stats), RenderError> {
+        let (size, grid) = (view.size, *self.volume.grid());
+        let stream = Arc::new(self.stream((scene, view), &window)?);
+        let host = Host { window, is_part, first_hit: None, surfaces: None };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
             Classification::After => {
                 let nothing = Volume::piece(Grid { dims: UVec3::ZERO, ..grid }, Vec::new());
@@ -131,34 +152,33 @@ impl StreamRenderer {
                 let matter = Matter::Streamed { stream: &stream, nothing: &nothing, numbers, is_range_known };
                 let frame = after::Frame::new(0, (matter, &self.transfer), scene, view, host);
                 self.check_held(frame.held_bytes())?;
-                after::Frame::draw(&[frame], self.vectors)
+                after::Frame::draw(&[frame], self.level)
             }
-            _ => Frame::new(&grid, Voxels::Streamed(&stream), scene, view, host, self.vectors).draw(self.vectors),
+            _ => Frame::new(&grid, Voxels::Streamed(&stream), scene, view, host, self.level).draw(self.level),
         };
         if let Some(failure) = stream.pool.take_failure() {
             return Err(failure.into());
         }
         let Reads { chunks, bytes, most_held, .. } = stream.pool.reads();
-        let image = Image { width: size[0], height: size[1], pixels: content.colors };
+        let StreamedVolume { store, level, .. } = &self.volume;
         let store = StoreCounts {
-            level: self.level as u64,
-            chunks_total: self.store.levels()[self.level].chunks().as_u64vec3().element_product(),
+            level: *level as u64,
+            chunks_total: store.levels()[*level].chunks().as_u64vec3().element_product(),
             chunks_read: chunks.len() as u64,
             bytes_read: bytes,
             chunk_bytes: most_held,
         };
-        let stats = Stats { store: Some(store), ..statistics(self.simd, size, counts, start) };
-        Ok(Rendering { image, stats })
+        Ok((content, Stats { store: Some(store), ..statistics(self.simd, size, counts, start) }))
     }
 
     /// Checks that the boxes of voxels fit into memory that threads copy from chunks, given the bytes of one.
     fn check_held(&self, bytes: f64) -> Result<(), SettingError> {
         let all = bytes * rayon::current_num_threads() as f64;
-        let memory = self.memory.max(LEAST_HELD);
+        let memory = self.volume.memory.max(LEAST_HELD);
         if all <= memory as f64 {
             return Ok(());
         }
-        let found = format!("{}, in which 32×32 pixels see a box of voxels of {bytes:.0} bytes", self.level);
+        let found = format!("{}, in which 32×32 pixels see a box of voxels of {bytes:.0} bytes", self.volume.level);
         let allowed =
             format!("a coarser level, more pixels, or more memory than {memory} bytes for all threads' boxes");
         Err(SettingError::new("volume.level", found, allowed))
@@ -166,14 +186,14 @@ impl StreamRenderer {
 
     /// The map from values to the numbers that are interpolated, and whether its range is that of all values.
     fn numbers(&self) -> (Normalization, bool) {
-        let known = self.store.range(self.level);
+        let known = self.volume.store.range(self.volume.level);
         let range = known.or(self.sampled).unwrap_or([0.0; 2]);
         (Normalization::new(range.map(f64::from)), known.is_some())
     }
 
     /// The store in a view.
-    fn stream(&self, view: ViewGeometry, window: &Window) -> Result<Stream, SettingError> {
-        let Self { store, level, scene, transfer, .. } = self;
+    fn stream(&self, (scene, view): (&Scene, ViewGeometry), window: &Window) -> Result<Stream, SettingError> {
+        let StreamedVolume { store, level, memory, .. } = &self.volume;
         let (splatting, grid) = (&scene.splatting, store.levels()[*level].grid);
         let slabs = window.with_lead(splatting.compositing, Classification::Before).slabs;
         let threads = rayon::current_num_threads();
@@ -182,7 +202,7 @@ impl StreamRenderer {
             readers.map_err(|error| SettingError::new("threads", error.to_string(), "threads that can be started"))?;
         let side = Source::side(store.levels()[*level].chunk, &grid);
         let chunk_bytes = side.as_u64vec3().element_product().saturating_mul(4);
-        let ahead = self.memory as u64 / chunk_bytes / (2 * threads as u64);
+        let ahead = memory / chunk_bytes / (2 * threads as u64);
         Ok(Stream {
             ahead: ahead.clamp(2, MOST_AHEAD) as usize,
             source: Source {
@@ -192,16 +212,28 @@ impl StreamRenderer {
                 side,
                 ranges: Ranges::new(StoreLevel { grid, chunk: side }.chunks().element_product()),
                 splats: (splatting.classification == Classification::Before).then(|| Splats {
-                    transfer: transfer.clone(),
+                    transfer: self.transfer.clone(),
                     clipped: scene.clip.voxels(&grid, splatting.radius),
                     projection: Projection::new(view, splatting.order, &slabs),
                     support: Kernel::new(splatting.radius, splatting.falloff).support(),
                 }),
             },
-            pool: Pool::new(self.memory),
+            pool: Pool::new(usize::try_from(*memory).unwrap_or(usize::MAX)),
             readers,
         })
     }
+}
+
+/// A scene for a sample with its transfer function, once its classification is known.
+fn settled(sample: &Volume, scene: &Scene) -> Result<(Scene, TransferFunction), RenderError> {
+    scene.check()?;
+    scene.check_volume(sample)?;
+    check(scene)?;
+    check_sample(sample, scene)?;
+    let transfer = scene.resolve(sample);
+    let scene = scene.classified(sample);
+    check_streamed(&scene)?;
+    Ok((scene, transfer))
 }
 
 /// Checks that a scene and the sample of its volume are of one channel of values.

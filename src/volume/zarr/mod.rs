@@ -152,6 +152,10 @@ impl Store for ZarrStore {
         self.image.levels[0].array.fill()
     }
 
+    fn times(&self) -> u32 {
+        self.image.series.times
+    }
+
     fn identity(&self) -> String {
         let mut hash = blake3::Hasher::new();
         hash.update(b"sheetsplat zarr 1\n");

@@ -11,8 +11,7 @@ use std::path::{Path, PathBuf};
 use sheetsplat::RenderError;
 use sheetsplat::image::Image;
 use sheetsplat::image::output::Target;
-use sheetsplat::scene::Scene;
-use sheetsplat::volume::Volume;
+use sheetsplat::scene::{OpenVolume, Scene};
 
 use crate::annotate::{Annotate, Overlay};
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, parse_range, scene_file};
@@ -147,7 +146,7 @@ struct Shown<'a> {
     /// With everything stated that depends on the volume, at the first time.
     scene: Scene,
     /// At the first time.
-    volume: Volume,
+    volume: OpenVolume,
     times: Option<Range<u32>>,
     overlay: Overlay,
     outputs: &'a Outputs,
@@ -161,14 +160,14 @@ impl<'a> Shown<'a> {
     ) -> Result<Self, Failure> {
         let Arguments { input, annotate, .. } = arguments;
         let scene = input.choose_levels(&scene, Scene::explicit_all_around)?;
-        let volume = input.load_volume(&scene, outputs)?;
-        let count = volume.encoding().map_or(1, |encoding| encoding.times);
+        let volume = input.open_volume(&scene, outputs)?;
+        let count = volume.times();
         if let Some(Range { start, end }) = times.clone().filter(|times| times.end > count) {
             let allowed = format!("within 0..{count}, the times of {}", input.name);
             return Err(Failure::Input(format!("--time: found {start}..{end}, allowed: {allowed}")));
         }
-        let scene = input.settled(&volume, &scene, Scene::explicit_all_around)?;
-        let overlay = annotate.overlay(&scene, &volume)?;
+        let scene = input.settled(volume.sample(), &scene, Scene::explicit_all_around)?;
+        let overlay = annotate.overlay(&scene, volume.sample())?;
         Ok(Self { scene, volume, times, overlay, outputs })
     }
 

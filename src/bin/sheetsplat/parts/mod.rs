@@ -5,12 +5,10 @@ pub(crate) mod split;
 
 use std::ops::Range;
 use std::path::Path;
-use std::sync::Arc;
 
 use sheetsplat::Stats;
-use sheetsplat::scene::Scene;
+use sheetsplat::scene::{OpenVolume, Scene};
 use sheetsplat::settings::{Region, Window};
-use sheetsplat::volume::Volume;
 
 use crate::arguments::Input;
 use crate::failure::Failure;
@@ -72,7 +70,7 @@ impl Part {
     pub(crate) fn draw(
         &self,
         input: &Input,
-        volume: Arc<Volume>,
+        volume: OpenVolume,
         scene: &Scene,
         window: &Window,
     ) -> Result<(sheetsplat::Part, Stats), Failure> {

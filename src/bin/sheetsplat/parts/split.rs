@@ -27,8 +27,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = input.scene()?;
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     let scene = input.choose_levels(&scene, Scene::explicit)?;
-    let volume = input.load_volume(&scene, &outputs)?;
-    let scene = input.settled(&volume, &scene, Scene::explicit)?;
+    let volume = input.open_volume(&scene, &outputs)?;
+    let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
     let windows = part::split(&volume, &scene, *parts as usize);
     let line = |Window { slabs, region }: Window| format!("--slabs {}..{} --region {region}\n", slabs.start, slabs.end);
     let lines: String = windows.map_err(|error| input.failure(error))?.into_iter().map(line).collect();

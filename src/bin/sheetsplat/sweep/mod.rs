@@ -5,10 +5,9 @@ mod sheet;
 
 use std::borrow::Cow;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use sheetsplat::image::Image;
-use sheetsplat::scene::{Channel, Scene};
+use sheetsplat::scene::{Channel, OpenVolume, Scene};
 
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
@@ -151,16 +150,16 @@ fn draw(
     let Arguments { input, annotate, .. } = arguments;
     let headless = input.headless(false, scenes.iter().map(|(scene, _)| scene))?;
     let mut progress = Progress::new(scenes.len(), progress);
-    let mut last: Option<(Scene, Arc<_>)> = None;
+    let mut last: Option<(Scene, OpenVolume)> = None;
     let mut tiles = Vec::new();
     for (scene, label) in scenes {
         // Any other volume is dropped before the next one is read.
         let volume = match last.take().filter(|(last, _)| has_same_volume(last, &scene)) {
             Some((_, volume)) => volume,
-            None => Arc::new(input.load_volume(&scene, outputs)?),
+            None => input.open_volume(&scene, outputs)?,
         };
-        let scene = input.settled(&volume, &scene, Scene::explicit)?;
-        let overlay = annotate.overlay(&scene, &volume)?;
+        let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
+        let overlay = annotate.overlay(&scene, volume.sample())?;
         let mut rendering = headless.render_volume(volume.clone(), &scene).map_err(|error| input.failure(error))?;
         log_frame(&label.join(", "), &rendering.stats);
         overlay.draw(&mut rendering.image);

@@ -1,0 +1,114 @@
+"""Volumes that do not fit into memory: read while they are drawn."""
+
+import http.server
+import json
+import pathlib
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+
+import sheetsplat
+from sheetsplat import SceneError, View, Volume, VolumeError
+
+SIDE, CHUNK = 96, 16
+MEMORY = "3MiB"
+LOOK: dict[str, Any] = {
+    "image": {"width": 90, "height": 80},
+    "camera": {"direction": [0.4, 0.9, -0.3], "fit": "volume"},
+    "transfer": {"color": [[0, [1, 0.9, 0.8]]], "opacity": [[0, 0], [60, 0], [200, 0.8]]},
+    "splatting": {"opacity_threshold": 1, "classification": "before"},
+}
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """A Zarr array of a ball, whose chunks of zeros are left out."""
+    z, y, x = np.ogrid[-1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j]
+    values = np.clip(300 * (0.8 - np.sqrt(x * x + y * y + z * z)), 0, 250).astype(np.uint8)
+    path = tmp_path_factory.mktemp("stores") / "ball.zarr"
+    path.mkdir()
+    metadata = {
+        "zarr_format": 2,
+        "shape": [SIDE] * 3,
+        "chunks": [CHUNK] * 3,
+        "dtype": "|u1",
+        "order": "C",
+        "compressor": None,
+        "filters": None,
+        "fill_value": 0,
+    }
+    (path / ".zarray").write_text(json.dumps(metadata))
+    for at in np.ndindex(*[SIDE // CHUNK] * 3):
+        chunk = values[tuple(slice(CHUNK * a, CHUNK * (a + 1)) for a in at)]
+        if chunk.any():
+            (path / ".".join(map(str, at))).write_bytes(chunk.tobytes())
+    return path
+
+
+def test_bytes_are_those_of_a_volume_in_memory(ball: pathlib.Path) -> None:
+    whole, streamed = View(ball, **LOOK), View(ball, memory=MEMORY, **LOOK)
+    assert (whole.volume.streamed, streamed.volume.streamed) == (False, True)
+    assert streamed.volume.shape == whole.volume.shape == (SIDE,) * 3
+    for direction in [(0.4, 0.9, -0.3), (0, -1, 0)]:
+        pictures = [view.render(camera={"direction": direction}) for view in (whole, streamed)]
+        np.testing.assert_array_equal(*pictures)
+        assert np.asarray(pictures[0])[..., 3].max() > 0.9
+    stats = pictures[1].stats
+    assert 0 < stats["chunks_read"] < stats["chunks_total"] == (SIDE // CHUNK) ** 3
+    parts = [[view.part(**piece) for piece in view.split(6)] for view in (whole, streamed)]
+    np.testing.assert_array_equal(*[sheetsplat.merge(each) for each in parts])
+    turns = [list(view.orbit(count=3)) for view in (whole, streamed)]
+    for pictures in zip(*turns, strict=True):
+        np.testing.assert_array_equal(*pictures)
+
+
+def test_what_needs_all_values_is_refused(ball: pathlib.Path) -> None:
+    volume = Volume(ball, memory=MEMORY)
+    assert volume.info()["streamed"] and volume.info()["max"] <= 250
+    for attempt in (lambda: volume.values, lambda: Volume(volume, spacing=2)):
+        with pytest.raises(VolumeError, match="found a volume that is streamed"):
+            attempt()
+    with pytest.raises(SceneError, match="volume: found a volume that is streamed, with the reference backend"):
+        View(volume, backend="reference")
+    with pytest.raises(SceneError, match=r"memory: found \"2XB\", allowed: a number of bytes"):
+        Volume(ball, memory="2XB")
+    assert not Volume(ball, memory=1 << 23).streamed
+    with pytest.raises(VolumeError, match="level"):
+        Volume(ball, level=1)
+
+
+def test_addresses(ball: pathlib.Path) -> None:
+    class Quiet(http.server.SimpleHTTPRequestHandler):
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments, directory=str(ball.parent))
+
+        def log_message(self, *arguments: Any) -> None:
+            pass
+
+    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Quiet)
+    thread = threading.Thread(target=server.serve_forever)
+    thread.start()
+    try:
+        address = f"http://127.0.0.1:{server.server_port}/ball.zarr"
+        image = sheetsplat.render(address, **LOOK)
+        np.testing.assert_array_equal(image, sheetsplat.render(ball, **LOOK))
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()
+
+
+def test_workers_read_their_own_chunks(ball: pathlib.Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="distributed is not installed")
+    import sheetsplat.dask
+
+    view = View(ball, memory=MEMORY, **LOOK)
+    expected = sheetsplat.merge(view.part(**piece) for piece in view.split(5))
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        future = sheetsplat.dask.render(str(ball), client=client, parts=5, memory=MEMORY, **LOOK)
+        np.testing.assert_array_equal(future.result(timeout=120), expected)

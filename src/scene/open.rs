@@ -1,0 +1,107 @@
+//! Opening a scene's volume: in memory, or where it fits into none, to be read while it is drawn.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::{Scene, load};
+use crate::volume::{Access, Grid, ReadOptions, StreamedVolume, Volume, VolumeError};
+
+/// A volume that can be drawn.
+#[derive(Clone, Debug)]
+pub enum OpenVolume {
+    /// It is in memory.
+    Whole(Arc<Volume>),
+    /// It is read while it is drawn.
+    Streamed(StreamedVolume),
+}
+
+impl OpenVolume {
+    /// The volume by which everything is chosen that scenes leave open: itself, or the sample of one that is streamed.
+    pub fn sample(&self) -> &Arc<Volume> {
+        match self {
+            Self::Whole(volume) => volume,
+            Self::Streamed(StreamedVolume { sample, .. }) => sample,
+        }
+    }
+
+    /// The number of times in the file, of which the volume is one.
+    pub fn times(&self) -> u32 {
+        match self {
+            Self::Whole(volume) => volume.encoding().map_or(1, |encoding| encoding.times),
+            Self::Streamed(volume) => volume.store.times(),
+        }
+    }
+
+    /// The number of the level that is drawn, 0 for the finest.
+    pub fn level(&self) -> u32 {
+        match self {
+            Self::Whole(volume) => volume.level(),
+            Self::Streamed(volume) => volume.level as u32,
+        }
+    }
+
+    /// The grid of the voxels that are drawn.
+    pub fn grid(&self) -> &Grid {
+        match self {
+            Self::Whole(volume) => volume.grid(),
+            Self::Streamed(volume) => volume.grid(),
+        }
+    }
+}
+
+impl From<Arc<Volume>> for OpenVolume {
+    fn from(volume: Arc<Volume>) -> Self {
+        Self::Whole(volume)
+    }
+}
+
+impl From<Volume> for OpenVolume {
+    fn from(volume: Volume) -> Self {
+        Self::Whole(volume.into())
+    }
+}
+
+impl From<StreamedVolume> for OpenVolume {
+    fn from(volume: StreamedVolume) -> Self {
+        Self::Streamed(volume)
+    }
+}
+
+impl Scene {
+    /// Opens the volume: as [`Self::load_volume`] does, or if it does not fit into memory and can be read by boxes, to be streamed (SPEC §13).
+    ///
+    /// # Errors
+    /// As for [`Self::load_volume`].
+    pub fn open_volume(&self) -> Result<OpenVolume, VolumeError> {
+        self.open_volume_and_files(&ReadOptions::default()).map(|(volume, _)| volume)
+    }
+
+    /// Like [`Self::open_volume`], with the options of [`Self::load_volume_with`], and the files of [`Self::load_volume_and_files`].
+    ///
+    /// # Errors
+    /// As for [`Self::load_volume_with`].
+    pub fn open_volume_and_files(&self, options: &ReadOptions) -> Result<(OpenVolume, Vec<PathBuf>), VolumeError> {
+        let scene = self.choose_levels(options, Self::explicit)?;
+        let access = Access::new(options)?;
+        if let Some(volume) = streamed(&scene, options.memory_limit(), &access)? {
+            return Ok((volume.into(), access.files()));
+        }
+        let (volume, files) = scene.load_volume_and_files(options)?;
+        Ok((volume.into(), files))
+    }
+}
+
+/// The scene's volume, if it has one channel, can be read by boxes, and fits into no memory; `None` for any other. A file that cannot be opened gives
+/// `None` too: reading it as a whole then tells why.
+fn streamed(scene: &Scene, memory: u64, access: &Access) -> Result<Option<StreamedVolume>, VolumeError> {
+    let Some(Ok(store)) = load::store(scene, access) else { return Ok(None) };
+    let level = scene.level.unwrap_or(0) as usize;
+    let Some(of) = store.levels().get(level) else { return Ok(None) };
+    let bytes = |dims: [u32; 3]| dims.into_iter().fold(4, |bytes: u64, n| bytes.saturating_mul(n.into()));
+    // Every thread that draws or reads holds some chunks, beside those that wait for other tiles.
+    let least = bytes(of.chunk.to_array()).saturating_mul(4 * rayon::current_num_threads() as u64);
+    if bytes(of.grid.dims.to_array()) <= memory || least > memory / 2 {
+        return Ok(None);
+    }
+    StreamedVolume::new(&load::origin(&scene.volume), store, level, memory).map(Some)
+}
