@@ -134,7 +134,7 @@ class _Source:
     def view(self, scene: Scene, side: str | None, backend: str) -> View:
         # Every worker opens it for the same scene, which decides the level.
         memory = _limit() if self.memory is None else self.memory
-        volume = _opened(self.what, self.look, self.spacing, self.labels, memory)
+        volume = _opened(self.what, self.look, self.spacing, self.labels, memory, progress=False)
         return View(volume, scene=scene, side=side, backend=backend)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _native as native
+from ._loading import loading
 from .volume import Volume, _memory
 
 __all__ = ["Scene"]
@@ -77,9 +78,10 @@ class Scene:
         """Whether ``volume.path`` or ``volume.builtin`` is stated."""
         return self._native.names_volume
 
-    def load_volume(self, *, memory: int | str | None = None) -> Volume:
-        """Opens the volume that the scene names, with a limit of memory as for `Volume`."""
-        return Volume._of(self._native.load_volume(_memory(memory)))
+    def load_volume(self, *, memory: int | str | None = None, progress: bool = True) -> Volume:
+        """Opens the volume that the scene names; `memory` and `progress` are as for `Volume`."""
+        with loading(None, progress) as bytes_read:
+            return Volume._of(self._native.load_volume(_memory(memory), bytes_read))
 
     def explicit(self, volume: Volume, *, all_around: bool = False) -> Scene:
         """The same scene with everything stated that depends on the volume.

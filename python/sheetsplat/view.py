@@ -44,6 +44,8 @@ class View:
         Part of the name of the GPU.
     memory : int or str, optional
         As for `Volume`. Of a store with several levels the coarsest is drawn whose voxels are no larger than a pixel.
+    progress : bool
+        Show a bar while a path is read for more than a second, if tqdm is installed.
     **settings
         Settings over those of `scene`, as for `Scene`.
 
@@ -68,9 +70,10 @@ class View:
         backend: str = "cpu",
         adapter: str | None = None,
         memory: int | str | None = None,
+        progress: bool = True,
         **settings: Any,
     ) -> None:
-        volume, look = _what_and_how(source, spacing, labels, scene, settings, memory)
+        volume, look = _what_and_how(source, spacing, labels, scene, settings, memory, progress)
         if side is not None:
             look = look.seen_from(volume, side)
         self._volume, self._scene = volume, look
@@ -181,6 +184,7 @@ def _what_and_how(
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None,
     settings: dict[str, Any],
     memory: int | str | None,
+    progress: bool,
 ) -> tuple[Volume, Scene]:
     if isinstance(source, Scene) or _is_scene_file(source):
         source = look = Scene(source, **settings)
@@ -191,7 +195,7 @@ def _what_and_how(
         if any(key == "volume" or key.startswith("volume.") for key in settings):
             found, allowed = "a volume beside the source", "no such key: `source`, `spacing` and `labels`"
             raise SceneError(f"volume: found {found}, allowed: {allowed}", "volume", found, allowed)
-    return _opened(source, look, spacing, labels, memory), look
+    return _opened(source, look, spacing, labels, memory, progress), look
 
 
 def _opened(
@@ -200,12 +204,13 @@ def _opened(
     spacing: float | Sequence[float] | None,
     labels: Any,
     memory: int | str | None,
+    progress: bool,
 ) -> Volume:
     """The volume that a scene names, or another source's for a scene that may choose its level."""
     if isinstance(source, Scene):
-        volume = source.load_volume(memory=memory)
+        volume = source.load_volume(memory=memory, progress=progress)
     elif isinstance(source, (str, os.PathLike)):
-        volume = Volume._of(_open(source, memory, [None, None, None], look._native))
+        volume = Volume._of(_open(source, memory, progress, [None, None, None], look._native))
     elif isinstance(source, Volume):
         volume = source
     else:
@@ -238,7 +243,7 @@ def render(source: Any, **arguments: Any) -> Image:
     source
         What is drawn: an array ``[z, y, x]``, an image of SimpleITK or nibabel, a path, a `Volume` or a `Scene`.
     **arguments
-        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, and settings.
+        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, `progress`, and settings.
 
     Returns
     -------
@@ -282,7 +287,7 @@ def orbit(
     fps : int
         Pictures per second of a movie.
     progress : bool
-        Show a progress bar while files are written, if tqdm is installed.
+        Show bars while the volume is read and files are written, if tqdm is installed.
     **arguments
         As for `View`.
 
@@ -291,7 +296,7 @@ def orbit(
     Ctrl-C stops between two pictures: numbered pictures that are complete stay, a movie is not written.
     """
     pattern = None if output is None else _files(os.fspath(output))
-    turns = View(source, **arguments).orbit(count=count, turn=turn, frames=frames)
+    turns = View(source, progress=progress, **arguments).orbit(count=count, turn=turn, frames=frames)
     if output is None or pattern is None:
         return turns
     numbers = _frames(count, frames)
@@ -384,7 +389,7 @@ def _swept(view: View, scenes: list[tuple[dict[str, Any], Scene]]) -> Iterator[t
 
 
 def info(
-    source: Any, *, spacing: float | Sequence[float] | None = None, memory: int | str | None = None
+    source: Any, *, spacing: float | Sequence[float] | None = None, memory: int | str | None = None, progress: bool = True
 ) -> dict[str, Any]:
     """Facts about a volume, as `Volume.info`.
 
@@ -393,4 +398,4 @@ def info(
     >>> info("builtin:cube:8")["shape"]
     [8, 8, 8]
     """
-    return _what_and_how(source, spacing, None, None, {}, memory)[0].info()
+    return _what_and_how(source, spacing, None, None, {}, memory, progress)[0].info()

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import _native as native
+from ._loading import loading
 from .errors import VolumeError
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ class Volume:
     memory : int or str, optional
         Bytes that the values may take, such as ``"2GiB"``; three quarters of the machine's without it. A volume of a path
         that takes more, and can be read by boxes, is streamed: read while it is drawn.
+    progress : bool
+        Show a bar while a path is read for more than a second, if tqdm is installed.
     channel, time, level : int, optional
         The channel, the time and the level of a path that holds several, counted from 0: all channels, the first time
         and the finest level without them.
@@ -62,6 +65,7 @@ class Volume:
         labels: Any = None,
         channel_axis: int | None = None,
         memory: int | str | None = None,
+        progress: bool = True,
         channel: int | None = None,
         time: int | None = None,
         level: int | None = None,
@@ -75,7 +79,7 @@ class Volume:
         if isinstance(source, Volume):
             self._native = source._native
         elif isinstance(source, (str, os.PathLike)):
-            self._native = _open(source, memory, [channel, time, level], None)
+            self._native = _open(source, memory, progress, [channel, time, level], None)
         else:
             array, own_spacing, axes, origin = _converted(source)
             self._native = native.Volume.from_arrays([array], steps or own_spacing, tags, axes, origin)
@@ -150,13 +154,15 @@ class Volume:
 def _open(
     path: str | os.PathLike[str],
     memory: int | str | None,
+    progress: bool,
     selection: list[int | None],
     scene: native.Scene | None,
 ) -> native.Volume:
     name = os.fsdecode(path)
     if name.startswith(_BUILTIN):
         return native.Volume.builtin(name.removeprefix(_BUILTIN))
-    return native.Volume.open(name, _memory(memory), selection, scene)
+    with loading(name, progress) as bytes_read:
+        return native.Volume.open(name, _memory(memory), selection, scene, bytes_read)
 
 
 def _memory(memory: int | str | None) -> str | None:

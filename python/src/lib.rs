@@ -28,5 +28,5 @@ mod _native {
     #[pymodule_export]
     use crate::view::View;
     #[pymodule_export]
-    use crate::volume::Volume;
+    use crate::volume::{BytesRead, Volume};
 }

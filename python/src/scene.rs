@@ -10,7 +10,7 @@ use sheetsplat::volume::PatientSide;
 
 use crate::error::{Raised, setting};
 use crate::settings;
-use crate::volume::{Volume, reading};
+use crate::volume::{BytesRead, Volume, reading};
 
 /// The sides of a patient.
 const SIDES: [(&str, PatientSide); 6] = [
@@ -71,8 +71,8 @@ impl Scene {
     }
 
     /// The volume that the scene names.
-    fn load_volume(&self, py: Python<'_>, memory: Option<&str>) -> PyResult<Volume> {
-        let options = reading(memory)?;
+    fn load_volume(&self, py: Python<'_>, memory: Option<&str>, bytes_read: Option<&BytesRead>) -> PyResult<Volume> {
+        let options = reading(memory, bytes_read)?;
         let (volume, _) = py.detach(|| self.scene.open_volume_and_files(&options).map_err(Raised::from))?;
         Ok(Volume(volume))
     }

@@ -51,9 +51,28 @@ impl Volume {
     }
 }
 
-/// The options for reading with a memory limit, such as `2GiB`.
-pub(crate) fn reading(memory: Option<&str>) -> Result<ReadOptions, Raised> {
+/// The number of bytes that have been read, which another thread may ask for meanwhile.
+#[pyclass(frozen, module = "sheetsplat._native")]
+#[derive(Default)]
+pub(crate) struct BytesRead(sheetsplat::volume::BytesRead);
+
+#[pymethods]
+impl BytesRead {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    #[getter]
+    fn count(&self) -> u64 {
+        self.0.count()
+    }
+}
+
+/// The options for reading with a memory limit, such as `2GiB`, and with something that counts the bytes.
+pub(crate) fn reading(memory: Option<&str>, bytes_read: Option<&BytesRead>) -> Result<ReadOptions, Raised> {
     let mut options = ReadOptions::default();
+    options.bytes_read = bytes_read.map(|read| read.0.clone());
     let parse = |text: &str| {
         let parsed = ReadOptions::parse_memory(text);
         parsed.map_err(|allowed| setting("memory", &format!("{text:?}"), allowed.trim_start_matches("allowed: ")))
@@ -100,8 +119,9 @@ impl Volume {
         memory: Option<&str>,
         selection: [Option<u32>; 3],
         scene: Option<&Scene>,
+        bytes_read: Option<&BytesRead>,
     ) -> PyResult<Self> {
-        let options = reading(memory)?;
+        let options = reading(memory, bytes_read)?;
         let source = VolumeSource::File(path);
         let mut shown = match scene {
             Some(scene) => sheetsplat::Scene { volume: source, ..scene.scene.clone() },

@@ -4,6 +4,7 @@ import http.server
 import json
 import pathlib
 import threading
+import time
 from typing import Any
 
 import numpy as np
@@ -112,3 +113,43 @@ def test_workers_read_their_own_chunks(ball: pathlib.Path) -> None:
     ):
         future = sheetsplat.dask.render(str(ball), client=client, parts=5, memory=MEMORY, **LOOK)
         np.testing.assert_array_equal(future.result(timeout=120), expected)
+
+
+def test_bars_count_what_is_read(ball: pathlib.Path, monkeypatch: pytest.MonkeyPatch, tmp_path: pathlib.Path) -> None:
+    from sheetsplat import _loading, _native
+
+    read = _native.BytesRead()
+    _native.Volume.open(str(ball), None, [None, None, None], None, read)
+    stored = sum(path.stat().st_size for path in ball.iterdir())
+    # Metadata are read more than once.
+    assert stored <= read.count < stored + 100_000
+    shown: list[dict[str, Any]] = []
+
+    class Bar:
+        def __init__(self, **arguments: Any) -> None:
+            self.n = 0
+            shown.append({**arguments, "bar": self})
+
+        def __enter__(self) -> "Bar":
+            return self
+
+        def __exit__(self, *_: Any) -> None:
+            pass
+
+        def update(self, count: int) -> None:
+            self.n += count
+
+    tqdm = pytest.importorskip("tqdm.auto")
+    monkeypatch.setattr(tqdm, "tqdm", Bar)
+    monkeypatch.setattr(_loading, "_DELAY", 0.0)
+    path = tmp_path / "values.npy"
+    np.save(path, np.zeros((200, 200, 100), np.float32))
+    with _loading.loading(str(path), True) as read:
+        _native.Volume.open(str(path), None, [None, None, None], None, read)
+        # The bar takes a step.
+        time.sleep(0.5)
+    (bar,) = shown
+    assert (bar["desc"], bar["total"], bar["bar"].n) == (str(path), path.stat().st_size, path.stat().st_size)
+    shown.clear()
+    Volume(path, progress=False)
+    assert not shown

@@ -10,7 +10,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::VolumeError;
 use super::address;
-use super::file::Files;
+use super::file::{BytesRead, Files};
 use super::memory;
 use super::seek::{Located, Notes};
 use super::series::Selection;
@@ -40,6 +40,8 @@ pub struct ReadOptions {
     pub level: Option<u32>,
     /// Files in memory, which are read instead of the disk's; `None` reads the disk.
     pub files: Option<Files>,
+    /// What counts the bytes that are read, for programs that show how far they are.
+    pub bytes_read: Option<BytesRead>,
 }
 
 impl ReadOptions {
@@ -83,6 +85,11 @@ impl ReadOptions {
         Self { files: Some(files), ..self }
     }
 
+    /// These options with a count of the bytes that are read.
+    pub fn counted_by(self, bytes_read: &BytesRead) -> Self {
+        Self { bytes_read: Some(bytes_read.clone()), ..self }
+    }
+
     /// The limit of [`Self::memory`], or the default.
     pub fn memory_limit(&self) -> u64 {
         self.memory.unwrap_or_else(memory::default_limit)
@@ -111,6 +118,7 @@ struct Inner {
     folder: Option<Folder>,
     limit: u64,
     reserved: AtomicU64,
+    bytes_read: Option<BytesRead>,
     files: Mutex<BTreeSet<PathBuf>>,
 }
 
@@ -130,7 +138,8 @@ impl Access {
         let given = options.files.clone();
         let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
         let limit = options.memory_limit();
-        let inner = Inner { given, folder, limit, reserved: AtomicU64::new(0), files: Mutex::default() };
+        let (reserved, bytes_read) = (AtomicU64::new(0), options.bytes_read.clone());
+        let inner = Inner { given, folder, limit, reserved, bytes_read, files: Mutex::default() };
         Ok(Self(
             Arc::new(inner),
             Selection { channel: options.channel, time: options.time, level: options.level },
@@ -193,6 +202,11 @@ impl Access {
             return Err(invalid(path, "file", "a path that leads elsewhere", allowed));
         }
         resolved.map(Cow::Owned).map_err(io_error(path))
+    }
+
+    /// What counts the bytes that are read.
+    pub(super) fn bytes_read(&self) -> Option<BytesRead> {
+        self.0.bytes_read.clone()
     }
 
     /// The files in memory that are read instead of the disk's.

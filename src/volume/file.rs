@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::fmt;
+use std::fs;
 use std::io::{self, Cursor, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Files in memory by their paths, as [`ReadOptions::with_files`](super::ReadOptions::with_files) takes them. Clones share the bytes.
 #[derive(Clone, Default, PartialEq, Eq)]
@@ -47,26 +49,84 @@ fn normal(path: &Path) -> PathBuf {
     path.components().filter(|component| *component != Component::CurDir).collect()
 }
 
-/// An open file.
-pub(super) enum File {
-    Disk(std::fs::File),
+/// Counts the bytes that are read of files, also while they are: clones share the count.
+///
+/// ```
+/// use std::path::Path;
+/// use sheetsplat::Volume;
+/// use sheetsplat::volume::{BytesRead, ReadOptions};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n01234567";
+/// let files = [("a.nrrd", header.as_bytes())].into_iter().collect();
+/// let read = BytesRead::default();
+/// Volume::open_with(Path::new("a.nrrd"), &ReadOptions::default().with_files(files).counted_by(&read))?;
+/// assert!(read.count() >= header.len() as u64);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default)]
+pub struct BytesRead(Arc<AtomicU64>);
+
+impl BytesRead {
+    /// The number of bytes until now. Parts of files that are looked at more than once count each time.
+    pub fn count(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn add(&self, bytes: u64) {
+        self.0.fetch_add(bytes, Ordering::Relaxed);
+    }
+}
+
+impl PartialEq for BytesRead {
+    /// Whether both share one count.
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
+impl Eq for BytesRead {}
+
+/// An open file, whose bytes are counted as they are read.
+pub(super) struct File {
+    bytes: Bytes,
+    read: Option<BytesRead>,
+}
+
+enum Bytes {
+    Disk(fs::File),
     Memory(Cursor<Arc<[u8]>>),
+}
+
+impl File {
+    pub(super) fn on_disk(file: fs::File, read: Option<BytesRead>) -> Self {
+        Self { bytes: Bytes::Disk(file), read }
+    }
+
+    pub(super) fn in_memory(bytes: &Arc<[u8]>, read: Option<BytesRead>) -> Self {
+        Self { bytes: Bytes::Memory(Cursor::new(Arc::clone(bytes))), read }
+    }
 }
 
 impl Read for File {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        match self {
-            Self::Disk(file) => file.read(buffer),
-            Self::Memory(bytes) => bytes.read(buffer),
+        let count = match &mut self.bytes {
+            Bytes::Disk(file) => file.read(buffer),
+            Bytes::Memory(bytes) => bytes.read(buffer),
+        }?;
+        if let Some(read) = &self.read {
+            read.add(count as u64);
         }
+        Ok(count)
     }
 }
 
 impl Seek for File {
     fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        match self {
-            Self::Disk(file) => file.seek(to),
-            Self::Memory(bytes) => bytes.seek(to),
+        match &mut self.bytes {
+            Bytes::Disk(file) => file.seek(to),
+            Bytes::Memory(bytes) => bytes.seek(to),
         }
     }
 }

@@ -68,7 +68,7 @@ pub(crate) use address::{is_address, written_in};
 use coefficients::KeptCoefficients;
 pub use colors::Texel;
 pub use display::ChannelDisplay;
-pub use file::Files;
+pub use file::{BytesRead, Files};
 pub(crate) use format::levels;
 pub use grid::Grid;
 pub(crate) use grid::{SPACING, check_spacing};

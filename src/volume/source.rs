@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 use std::fs;
-use std::io::{self, BufRead, BufReader, Cursor, Read, Seek};
+use std::io::{self, BufRead, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -35,13 +35,13 @@ impl Source {
         if !metadata.is_file() {
             return Err(invalid(path, "file", "a folder, pipe or device", "a regular file"));
         }
-        let file = File::Disk(fs::File::open(resolved).map_err(io_error(path))?);
+        let file = File::on_disk(fs::File::open(resolved).map_err(io_error(path))?, access.bytes_read());
         Ok(Self::new(path, metadata.len(), file, access))
     }
 
     /// Opens a file that is in memory.
     pub(super) fn in_memory(path: &Path, bytes: &Arc<[u8]>, access: &Access) -> Self {
-        Self::new(path, bytes.len() as u64, File::Memory(Cursor::new(Arc::clone(bytes))), access)
+        Self::new(path, bytes.len() as u64, File::in_memory(bytes, access.bytes_read()), access)
     }
 
     fn new(path: &Path, bytes: u64, file: File, access: &Access) -> Self {

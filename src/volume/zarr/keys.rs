@@ -118,7 +118,9 @@ impl Keys {
         #[cfg(feature = "http")]
         if let Place::Address(http) = &self.place {
             // The length need not be asked for first.
-            return http.whole(key, self.limit.load(Ordering::Relaxed));
+            let bytes = http.whole(key, self.limit.load(Ordering::Relaxed))?;
+            self.count(bytes.as_deref());
+            return Ok(bytes);
         }
         let bytes = self.bytes(key)?;
         bytes.map(|bytes| self.range(key, 0..bytes)).transpose()
@@ -150,7 +152,19 @@ impl Keys {
             #[cfg(feature = "http")]
             Place::Address(_) if range.is_empty() => Ok(Vec::new()),
             #[cfg(feature = "http")]
-            Place::Address(http) => http.range(key, &range)?.ok_or_else(missing),
+            Place::Address(http) => {
+                let bytes = http.range(key, &range)?;
+                self.count(bytes.as_deref());
+                bytes.ok_or_else(missing)
+            }
+        }
+    }
+
+    /// Counts bytes that came from an address; those of files count themselves.
+    #[cfg(feature = "http")]
+    fn count(&self, bytes: Option<&[u8]>) {
+        if let (Some(read), Some(bytes)) = (self.access.bytes_read(), bytes) {
+            read.add(bytes.len() as u64);
         }
     }
 
