@@ -3,7 +3,7 @@
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3, DVec4, UVec3};
+use glam::{DMat3, DVec2, DVec3, DVec4, UVec3};
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
@@ -129,7 +129,8 @@ impl ViewGeometry {
             (Method::ImageAligned, None) => {
                 let slabs = SlabGrid { origin: 0.0, width: splatting.slab_width * lambda };
                 slabs.check(w_wo.abs().dot(grid.center()) + radius, splatting.slab_width)?;
-                (slabs, row(m_vol.row(2), 0.0), radius, 1.0)
+                // Slabs are counted from the world's origin, so that the grids of levels, and of boxes of voxels, share them.
+                (slabs, row(m_vol.row(2), m_vol.row(2).dot(grid.place() / grid.spacing)), radius, 1.0)
             }
             (Method::ImageAligned, Some(eye)) => {
                 let slabs = SlabGrid { origin: eye.position.dot(basis.w), width: splatting.slab_width };
@@ -216,6 +217,16 @@ impl ViewGeometry {
         let p = voxel.as_dvec3().extend(1.0);
         let [x, y, depth, from_eye] = self.screen_from_voxel.map(|row| row.dot(p));
         (DVec2::new(x, y) / from_eye + self.middle()).extend(depth)
+    }
+
+    /// The place, in voxel indices, at a sheet depth on the ray through pixel coordinates: what [`Self::project`] projects there.
+    pub fn voxel_at(&self, pixel: DVec2, sheet_depth: f64) -> DVec3 {
+        let [x, y, depth, from_eye] = self.screen_from_voxel;
+        let at = pixel - self.middle();
+        // Three planes meet there.
+        let planes = [x - from_eye * at.x, y - from_eye * at.y, depth - DVec4::W * sheet_depth];
+        let normals = DMat3::from_cols_array_2d(&planes.map(|plane| plane.truncate().to_array())).transpose();
+        normals.inverse() * -DVec3::from_array(planes.map(|plane| plane.w))
     }
 
     /// The slabs that a voxel's kernel overlaps; empty before the near plane.

@@ -1,6 +1,7 @@
 //! Rendering without a host, to images in memory. A [`Backend`] draws them: the GPU, the processor or the f64 evaluation.
 
 mod backend;
+mod boxed;
 #[cfg(feature = "gpu")]
 mod content;
 #[cfg(feature = "gpu")]
@@ -18,6 +19,7 @@ mod view;
 
 use web_time::Instant;
 
+use self::boxed::BoxedView;
 pub use self::error::Error;
 #[cfg(feature = "gpu")]
 pub use self::gpu::GpuHeadless;
@@ -36,7 +38,7 @@ pub use crate::rendering::{Backend, Rendering};
 use crate::scene::{OpenVolume, Scene};
 use crate::settings::window::Window;
 use crate::stats::Stats;
-use crate::volume::{StreamedVolume, VolumeError};
+use crate::volume::{StreamedVolume, Volume, VolumeError};
 
 /// Renders with one backend. On the GPU it opens its own device; on the CPU it needs no driver.
 #[derive(Debug)]
@@ -147,6 +149,9 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.draw_part(window),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw_part(window),
+            (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => {
+                view.draw_part(window, &mut |volume, scene, window| self.draw_box(volume, scene, window))
+            }
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
@@ -156,8 +161,7 @@ impl Headless {
     /// A view of a volume with a scene's settings, for any number of frames. The scene's own volume is ignored.
     ///
     /// # Errors
-    /// If the backend cannot draw one of the scene's settings, the volume is larger than the device's textures, or the device fails; or if the volume is read
-    /// while it is drawn, which only the CPU backend does, also for [`Backend::Auto`] where nothing asks for the GPU.
+    /// If the backend cannot draw one of the scene's settings, the volume is larger than the device's textures, or the device fails.
     pub fn view(&self, volume: impl Into<OpenVolume>, scene: &Scene) -> Result<HeadlessView, RenderError> {
         let volume = match volume.into() {
             OpenVolume::Whole(volume) => volume,
@@ -180,22 +184,19 @@ impl Headless {
     }
 
     /// A view of a volume that is read while it is drawn.
-    #[cfg(feature = "cpu")]
     fn stream(&self, volume: StreamedVolume, scene: &Scene) -> Result<HeadlessView, RenderError> {
-        if !self.draws_by_cpu() {
-            return Err(self.refuse_stream().into());
+        #[cfg(feature = "cpu")]
+        if self.draws_by_cpu() {
+            return Ok(HeadlessView::new(ViewBackend::Stream(Box::new(StreamRenderer::new(volume, scene)?)), None));
         }
-        Ok(HeadlessView::new(ViewBackend::Stream(Box::new(StreamRenderer::new(volume, scene)?)), None))
+        let view = Box::new(BoxedView::new(volume, scene)?);
+        Ok(HeadlessView::new(ViewBackend::Boxed(view, self.backend()), None))
     }
 
-    #[cfg(not(feature = "cpu"))]
-    fn stream(&self, _volume: StreamedVolume, _scene: &Scene) -> Result<HeadlessView, RenderError> {
-        Err(self.refuse_stream().into())
-    }
-
-    fn refuse_stream(&self) -> SettingError {
-        let found = format!("a volume that is streamed, with the {} backend", self.backend());
-        SettingError::new("volume", found, "the cpu backend, a level that fits into memory, or more memory")
+    /// Draws a window of a box of voxels of a volume that is streamed.
+    fn draw_box(&self, volume: Volume, scene: &Scene, window: &Window) -> Result<(Part, Stats), RenderError> {
+        let mut view = self.view(volume, scene)?;
+        self.draw_part(&mut view, window)
     }
 
     /// Changes a view's scene, whose own volume is ignored. Only what depends on the change is computed again: on the CPU as
@@ -221,6 +222,7 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.set_scene(scene),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.set_scene(scene),
+            (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => view.set_scene(scene),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }
@@ -240,6 +242,9 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.draw(),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw(),
+            (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => {
+                view.draw(&mut |volume, scene, window| self.draw_box(volume, scene, window))
+            }
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
@@ -259,8 +264,9 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Cpu(view)) if self.draws_by_cpu() => Ok(view.pick(pixel)?),
             #[cfg(feature = "cpu")]
-            (_, ViewBackend::Stream(_)) if self.draws_by_cpu() => Err(view::no_first_hits().into()),
+            (_, ViewBackend::Stream(_)) if self.draws_by_cpu() => Err(view::streamed_first_hits().into()),
             (Drawer::Reference, ViewBackend::Reference(view)) => Ok(view.pick(pixel)?),
+            (_, ViewBackend::Boxed(..)) => Err(view::streamed_first_hits().into()),
             #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }

@@ -1,7 +1,7 @@
 //! A view of a volume that any backend can draw.
 
-#[cfg(any(feature = "gpu", feature = "cpu"))]
 use super::Backend;
+use super::boxed::BoxedView;
 use super::reference::ReferenceView;
 #[cfg(feature = "cpu")]
 use crate::cpu::{CpuRenderer, StreamRenderer};
@@ -31,6 +31,8 @@ pub(super) enum ViewBackend {
     #[cfg(feature = "cpu")]
     Stream(Box<StreamRenderer>),
     Reference(Box<ReferenceView>),
+    /// A volume that is read while another backend draws it, box by box.
+    Boxed(Box<BoxedView>, Backend),
 }
 
 #[cfg(any(feature = "gpu", feature = "cpu"))]
@@ -42,6 +44,7 @@ impl ViewBackend {
             #[cfg(feature = "cpu")]
             Self::Cpu(_) | Self::Stream(_) => Backend::Cpu,
             Self::Reference(_) => Backend::Reference,
+            Self::Boxed(_, backend) => *backend,
         }
     }
 }
@@ -69,6 +72,7 @@ impl HeadlessView {
             #[cfg(feature = "cpu")]
             ViewBackend::Stream(view) => view.scene(),
             ViewBackend::Reference(view) => view.scene(),
+            ViewBackend::Boxed(view, _) => view.scene(),
         }
     }
 
@@ -85,6 +89,7 @@ impl HeadlessView {
             #[cfg(feature = "cpu")]
             ViewBackend::Stream(view) => view.set_camera(camera),
             ViewBackend::Reference(view) => view.set_camera(camera),
+            ViewBackend::Boxed(view, _) => view.set_camera(camera),
         }
     }
 
@@ -112,16 +117,22 @@ impl HeadlessView {
             #[cfg(feature = "cpu")]
             ViewBackend::Cpu(view) => view.set_first_hit(opacity),
             #[cfg(feature = "cpu")]
-            ViewBackend::Stream(_) if opacity.is_none() => Ok(()),
-            #[cfg(feature = "cpu")]
-            ViewBackend::Stream(_) => Err(no_first_hits()),
+            ViewBackend::Stream(_) => no_first_hits(opacity),
+            ViewBackend::Boxed(..) => no_first_hits(opacity),
             ViewBackend::Reference(view) => view.set_first_hit(opacity),
         }
     }
 }
 
+/// Refuses first hits of a volume that is read while it is drawn.
+fn no_first_hits(opacity: Option<f64>) -> Result<(), SettingError> {
+    match opacity {
+        None => Ok(()),
+        Some(_) => Err(streamed_first_hits()),
+    }
+}
+
 /// The error for first hits of a volume that is read while it is drawn.
-#[cfg(feature = "cpu")]
-pub(super) fn no_first_hits() -> SettingError {
+pub(super) fn streamed_first_hits() -> SettingError {
     SettingError::new("first_hit", "first hits of a volume that is streamed", "none, or more memory")
 }

@@ -197,7 +197,8 @@ impl PatchBins {
         let entries = entries.concat();
         let of_workgroups = |workgroups| {
             let passes = Passes::new(search, BLOCKS / workgroups, threads);
-            dispatches(&starts, groups as usize, &passes).map(|dispatches| (workgroups, passes, dispatches))
+            let dispatches = dispatches(&starts, groups as usize, &passes, planes.is_some());
+            dispatches.map(|dispatches| (workgroups, passes, dispatches))
         };
         let (workgroups, passes, dispatches) = of_workgroups(1).or_else(|_| of_workgroups(BLOCKS))?;
         Ok(Self {
@@ -337,23 +338,32 @@ pub fn grid(size: [u32; 2]) -> [u32; 2] {
     [size[0].div_ceil(PATCH[0]), size[1].div_ceil(PATCH[1])]
 }
 
-/// A number of dispatches that suffices for every patch: each processes groups until the next one might exceed the passes.
-fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, TileCapacityError> {
-    let most_bricks = passes.most.saturating_sub(passes.per_group) / passes.per_brick;
+/// A number of dispatches that suffices for every patch: each processes groups until the next one might exceed the passes. If it `looks_back`, one that
+/// continues another processes the group before its first once more.
+fn dispatches(starts: &[u32], groups: usize, passes: &Passes, looks_back: bool) -> Result<u32, TileCapacityError> {
+    let of_group = |bricks: u32| u64::from(passes.per_group) + u64::from(bricks) * u64::from(passes.per_brick);
+    let most = u64::from(passes.most);
     let of_patch = |first: usize| {
-        let (mut dispatches, mut taken) = (1, 0);
+        let (mut dispatches, mut taken, mut before) = (1, 0, 0);
         for group in starts[first..=first + groups].windows(2) {
             let bricks = group[1] - group[0];
-            if bricks > most_bricks {
-                let (what, required) = ("bricks behind a patch in one sheet group", bricks.into());
-                return Err(TileCapacityError { what, required, actual: most_bricks.into() });
-            }
-            let of_group = passes.per_group + bricks * passes.per_brick;
-            if taken + of_group > passes.most {
+            let needed = of_group(bricks);
+            if taken + needed > most && taken > 0 {
                 dispatches += 1;
-                taken = 0;
+                taken = if looks_back { of_group(before) } else { 0 };
             }
-            taken += of_group;
+            taken += needed;
+            if taken > most {
+                let what = match looks_back {
+                    true => "bricks behind a patch in two neighbouring sheet groups",
+                    false => "bricks behind a patch in one sheet group",
+                };
+                let groups_at_once = 1 + u32::from(looks_back);
+                let actual = passes.most.saturating_sub(groups_at_once * passes.per_group) / passes.per_brick;
+                let required = if looks_back { bricks + before } else { bricks };
+                return Err(TileCapacityError { what, required: required.into(), actual: actual.into() });
+            }
+            before = bricks;
         }
         Ok(dispatches)
     };

@@ -95,8 +95,21 @@ impl Part {
         window: &Window,
         content: Content,
     ) -> Result<Self, RenderError> {
+        Ok(Self::named(Identity::of((volume, scene), view)?, window.clone(), content))
+    }
+
+    /// A part with its slabs and pixels as its name.
+    pub(crate) fn named(identity: Identity, window: Window, content: Content) -> Self {
+        let Window { slabs: Range { start, end }, region } = &window;
+        Self { name: format!("slabs {start}..{end} of region {region}"), identity, window, content }
+    }
+}
+
+impl Identity {
+    /// What the parts of a scene of a volume have in common.
+    pub(crate) fn of((volume, scene): (&OpenVolume, &Scene), view: &ViewGeometry) -> Result<Self, RenderError> {
         let refused = |error: crate::scene::SceneError| SettingError::new("scene", error.to_string(), "another scene");
-        let identity = Identity {
+        Ok(Self {
             fingerprint: fingerprint::fingerprint(volume, scene).map_err(refused)?,
             size: view.size,
             slabs: view.slabs_of(volume.grid()),
@@ -104,18 +117,9 @@ impl Part {
             classification: scene.classification(volume.sample()),
             order: scene.splatting.order,
             background: scene.image.background,
-        };
-        Ok(Self::named(identity, window.clone(), content))
+        })
     }
 
-    /// A part with its slabs and pixels as its name.
-    fn named(identity: Identity, window: Window, content: Content) -> Self {
-        let Window { slabs: Range { start, end }, region } = &window;
-        Self { name: format!("slabs {start}..{end} of region {region}"), identity, window, content }
-    }
-}
-
-impl Identity {
     fn rule(&self) -> Rule {
         Rule { compositing: self.compositing, classification: self.classification }
     }

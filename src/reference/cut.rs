@@ -109,7 +109,7 @@ impl PixelRay {
     pub fn sheet(&self, geometry: &Geometry, depth: f64) -> f64 {
         let at = self.origin + depth * self.along;
         match (geometry.method, &geometry.eye) {
-            (Method::ImageAligned, None) => (at / geometry.grid.aspect()).dot(geometry.ro) / geometry.slab_width,
+            (Method::ImageAligned, None) => geometry.orthographic_depth(at) / geometry.slab_width,
             (Method::ImageAligned, Some(_)) => depth / geometry.slab_width,
             _ => {
                 let (axis, sign) = geometry.slice_axis();

@@ -157,13 +157,18 @@ impl Geometry {
         DVec2::new(self.size.x / 2.0 + self.basis.u.dot(p) / pix, self.size.y / 2.0 - self.basis.v.dot(p) / pix)
     }
 
-    /// A voxel's depth in the units of slabs: orthographic in the warped grid, from the volume's centre; perspective in `unit`s along w, from
+    /// A voxel's depth in the units of slabs: orthographic in the warped grid, from the world's origin; perspective in `unit`s along w, from
     /// the eye.
     pub fn depth(&self, voxel: UVec3) -> f64 {
         if self.eye.is_some() {
             return self.position(voxel).dot(self.basis.w);
         }
-        (self.grid.world_position(voxel) / self.grid.unit() / self.grid.aspect()).dot(self.ro)
+        self.orthographic_depth(self.grid.world_position(voxel) / self.grid.unit())
+    }
+
+    /// The depth, in the units of slabs, of a position in `unit`s from the grid's centre in an orthographic view.
+    pub fn orthographic_depth(&self, position: DVec3) -> f64 {
+        ((position + self.grid.place() / self.grid.unit()) / self.grid.aspect()).dot(self.ro)
     }
 
     /// A voxel's depth along w in the unwarped space, in `unit`s, by which voxels composited one by one are sorted.

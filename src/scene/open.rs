@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::names::{METHODS, name_of};
 use super::{Scene, load};
+use crate::error::setting::SettingError;
+use crate::settings::splatting::{Classification, Interpolation, Method, Splatting};
 use crate::volume::{Access, Grid, ReadOptions, StreamedVolume, Volume, VolumeError};
 
 /// A volume that can be drawn.
@@ -88,6 +91,34 @@ impl Scene {
         }
         let (volume, files) = scene.load_volume_and_files(options)?;
         Ok((volume.into(), files))
+    }
+
+    /// Checks that the scene can show a volume that is read while it is drawn, given its sample: one channel of values, with image-aligned sheets, and values that
+    /// are interpolated as they are.
+    pub(crate) fn check_streamed(&self, sample: &Volume) -> Result<(), SettingError> {
+        let refused = |key: &str, found: &str, allowed: &str| {
+            let found = format!("{found} for a volume that is streamed");
+            Err(SettingError::new(key, found, format!("{allowed}, or more memory")))
+        };
+        let of_volume = match sample {
+            _ if !self.further.is_empty() || !sample.further().is_empty() => Some("several channels"),
+            _ if sample.labels().is_some() => Some("labels"),
+            _ if sample.colors().is_some() => Some("colours"),
+            _ => None,
+        };
+        if let Some(found) = of_volume {
+            let found = format!("{found} of a volume that is streamed");
+            return Err(SettingError::new("volume", found, "one channel of values without labels, or more memory"));
+        }
+        let Splatting { interpolation, method, .. } = self.splatting;
+        if (self.classification(sample), interpolation) == (Classification::After, Interpolation::Exact) {
+            return refused("splatting.interpolation", "\"exact\"", "\"smooth\"");
+        }
+        if method != Method::ImageAligned {
+            let found = format!("{:?}", name_of(METHODS, method));
+            return refused("splatting.method", &found, "\"image-aligned\"");
+        }
+        Ok(())
     }
 }
 

@@ -57,6 +57,12 @@ impl Grid {
         Self { spacing: self.spacing * by, finest: Some(spacing), place: self.place * by, ..self }
     }
 
+    /// The grid of a box of its voxels, where they lie.
+    pub(crate) fn part(&self, from: UVec3, dims: UVec3) -> Self {
+        let own = Self { dims, ..*self };
+        Self { place: self.place + (from.as_dvec3() + own.center() - self.center()) * self.spacing, ..own }
+    }
+
     /// The place of the grid's centre in the world: the origin, but for coarser levels whose voxels do not fill the finest level's box.
     pub fn place(&self) -> DVec3 {
         self.place

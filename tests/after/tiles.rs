@@ -111,6 +111,27 @@ fn frames_with_holes_agree_with_the_f64_evaluation() {
     });
 }
 
+/// Where so much lies behind a patch that it is drawn in several dispatches, each draws the group again whose last plane its first slab needs.
+#[test]
+fn frames_of_many_dispatches_agree_with_the_f64_evaluation() {
+    let gpu = gpu();
+    let mut random = Random(22);
+    for (slab_width, direction) in [(1.0, DVec3::Z), (1.0, DVec3::new(0.4, 0.9, -0.3)), (0.6, DVec3::X)] {
+        let volume = random_volume(&mut random, (40.0, 45.0), SPACINGS[0]);
+        let (_, mut scene) = random_case(&mut random, false);
+        (scene.transfer.iso_ranges, scene.transfer.gradient_opacity) = (None, None);
+        scene.clip.planes.clear();
+        (scene.splatting.slab_width, scene.splatting.radius, scene.camera.direction) = (slab_width, 2.0, direction);
+        let half = (volume.grid().center() * volume.spacing()).length();
+        // Pixels as large as two voxels.
+        scene.camera.projection = Projection::Orthographic { height: Some(2.0 * half) };
+        scene.splatting.compositing = Compositing::Xray;
+        let [found, expected] = frames(&gpu, &volume, &scene);
+        assert!(shown(&expected) > 100, "{}", shown(&expected));
+        assert_at_least(decibels(rms(&found, &expected)), 80.0, format!("{slab_width} {direction}"));
+    }
+}
+
 /// With any threshold `T` no channel of any pixel changes by more than `1 - T`.
 #[test]
 fn culling_keeps_its_guarantee() {

@@ -3,6 +3,7 @@
 pub(crate) mod compare;
 pub(crate) mod images;
 pub(crate) mod shared;
+pub(crate) mod store;
 pub(crate) mod surfaces;
 
 use glam::{DVec3, DVec4, UVec3};

@@ -1,7 +1,7 @@
 //! Stores whose chunks are read while they are drawn: the bytes of the volume in memory, from no more than can matter.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::sync::{Arc, Mutex};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::cpu::{CpuRenderer, StreamRenderer};
@@ -17,73 +17,7 @@ use sheetsplat::{Image, RenderError, Scene};
 
 use crate::common::compare::assert_at_least;
 use crate::common::images::psnr;
-
-/// A volume in memory as a store that notes what is read of it.
-#[derive(Debug)]
-struct MemoryStore {
-    volume: Volume,
-    levels: [StoreLevel; 1],
-    /// The first voxels of all boxes that were read.
-    read: Mutex<BTreeSet<[u32; 3]>>,
-    /// Chunks from this plane on cannot be read.
-    broken_from: Option<u32>,
-    is_range_known: bool,
-}
-
-impl MemoryStore {
-    fn new(volume: &Volume, chunk: UVec3) -> Self {
-        let levels = [StoreLevel { grid: *volume.grid(), chunk }];
-        Self { volume: volume.clone(), levels, read: Mutex::default(), broken_from: None, is_range_known: true }
-    }
-
-    fn value(&self, voxel: UVec3) -> f32 {
-        self.volume.value(voxel)
-    }
-}
-
-impl Store for MemoryStore {
-    fn levels(&self) -> &[StoreLevel] {
-        &self.levels
-    }
-
-    fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
-        assert_eq!((level, values.len()), (0, dims.element_product() as usize));
-        assert!((from + dims).cmple(self.volume.dims()).all(), "{from} {dims}");
-        if self.broken_from.is_some_and(|plane| from.z + dims.z > plane) {
-            let source = std::io::Error::other("the disk is gone");
-            return Err(VolumeError::io("store", source));
-        }
-        self.read.lock().unwrap().insert(from.to_array());
-        let voxels = (0..dims.z).flat_map(|z| (0..dims.y).flat_map(move |y| (0..dims.x).map(move |x| [x, y, z])));
-        for (value, at) in values.iter_mut().zip(voxels) {
-            *value = self.value(from + UVec3::from(at));
-        }
-        Ok(values.len() as u64)
-    }
-
-    /// A chunk in which all voxels are 0 is not held.
-    fn contains(&self, _: usize, chunk: UVec3) -> Result<bool, VolumeError> {
-        let side = self.levels[0].chunk;
-        let (from, end) = (chunk * side, ((chunk + 1) * side).min(self.volume.dims()));
-        assert!(from.cmplt(end).all(), "chunk {chunk}");
-        let mut voxels =
-            (from.z..end.z).flat_map(|z| (from.y..end.y).flat_map(move |y| (from.x..end.x).map(move |x| [x, y, z])));
-        Ok(voxels.any(|at| self.value(at.into()) != 0.0))
-    }
-
-    fn fill(&self) -> f32 {
-        0.0
-    }
-
-    fn range(&self, _: usize) -> Option<[f32; 2]> {
-        let ends = |[least, greatest]: [f32; 2], value: &f32| [least.min(*value), greatest.max(*value)];
-        self.is_range_known.then(|| self.volume.values().iter().fold([f32::INFINITY, f32::NEG_INFINITY], ends))
-    }
-
-    fn identity(&self) -> String {
-        "memory".to_owned()
-    }
-}
+use crate::common::store::MemoryStore;
 
 /// A store that holds no chunk.
 #[derive(Debug)]
@@ -453,6 +387,4 @@ fn headless_views_are_streamed() {
     let error = view.set_first_hit(Some(0.5)).unwrap_err().to_string();
     assert!(error.starts_with("first_hit: found first hits of a volume that is streamed"), "{error}");
     assert!(cpu.pick(&view, [0, 0]).is_err());
-    let error = headless(Backend::Reference).view(streamed, &scene).unwrap_err().to_string();
-    assert!(error.starts_with("volume: found a volume that is streamed, with the reference backend"), "{error}");
 }

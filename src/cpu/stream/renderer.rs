@@ -24,9 +24,8 @@ use crate::kernel::Kernel;
 use crate::part::{self, Content, Part};
 use crate::rendering::Rendering;
 use crate::scene::Scene;
-use crate::scene::names::{METHODS, name_of};
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Classification, Interpolation, Method};
+use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
@@ -229,35 +228,6 @@ fn settled(sample: &Volume, scene: &Scene) -> Result<(Scene, TransferFunction), 
     scene.check()?;
     scene.check_volume(sample)?;
     check(scene)?;
-    check_sample(sample, scene)?;
-    let transfer = scene.resolve(sample);
-    let scene = scene.classified(sample);
-    check_streamed(&scene)?;
-    Ok((scene, transfer))
-}
-
-/// Checks that a scene and the sample of its volume are of one channel of values.
-fn check_sample(sample: &Volume, scene: &Scene) -> Result<(), SettingError> {
-    let found = match sample {
-        _ if !scene.further.is_empty() || !sample.further().is_empty() => "several channels",
-        _ if sample.labels().is_some() => "labels",
-        _ if sample.colors().is_some() => "colours",
-        _ => return Ok(()),
-    };
-    let found = format!("{found} of a volume that is streamed");
-    Err(SettingError::new("volume", found, "one channel of values without labels, or more memory"))
-}
-
-/// Checks that a scene whose classification is known can be streamed.
-fn check_streamed(scene: &Scene) -> Result<(), SettingError> {
-    let splatting = &scene.splatting;
-    if (splatting.classification, splatting.interpolation) == (Classification::After, Interpolation::Exact) {
-        let found = "\"exact\" for a volume that is streamed";
-        return Err(SettingError::new("splatting.interpolation", found, "\"smooth\", or more memory"));
-    }
-    if splatting.method != Method::ImageAligned {
-        let found = format!("{:?} for a volume that is streamed", name_of(METHODS, splatting.method));
-        return Err(SettingError::new("splatting.method", found, "\"image-aligned\", or more memory"));
-    }
-    Ok(())
+    scene.check_streamed(sample)?;
+    Ok((scene.classified(sample), scene.resolve(sample)))
 }

@@ -146,7 +146,7 @@ fn sheets(frame: &Frame, bricks: &[[UVec3; 2]]) -> u64 {
     let geometry = &frame.geometry;
     let aspect = geometry.grid.aspect();
     let (normal, origin) = match &geometry.eye {
-        None => (geometry.ro / aspect, DVec3::ZERO),
+        None => (geometry.ro / aspect, -geometry.grid.place() / geometry.grid.unit()),
         Some(eye) => (geometry.basis.w, eye.position),
     };
     let depths = bricks.iter().map(|&[first, end]| {

@@ -1,0 +1,260 @@
+//! Volumes that fit into no memory, drawn by a backend that draws volumes in memory: region by region, front to back, each time as many slabs (SPEC §11) as
+//! the box of voxels holds that bears on them. Where a region is opaque, no more boxes are read.
+
+mod chunks;
+
+use std::ops::Range;
+
+use web_time::Instant;
+
+use super::milliseconds_since;
+use crate::error::RenderError;
+use crate::error::setting::SettingError;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::image::Image;
+use crate::part::{self, Content, Identity, MergeError, Part};
+use crate::rendering::Rendering;
+use crate::scene::Scene;
+use crate::scene::names::{COMPOSITINGS, name_of};
+use crate::settings::camera::Camera;
+use crate::settings::splatting::{Classification, Compositing, Order};
+use crate::settings::window::{Region, Window};
+use crate::stats::{Counts, Stats, StoreCounts};
+use crate::volume::{StreamedVolume, Volume};
+use chunks::Chunks;
+
+/// The side of a region in pixels, but where voxels of so many pixels do not fit into memory.
+const SIDE: u32 = 256;
+
+/// The least side of a region.
+const LEAST_SIDE: u32 = 8;
+
+/// Draws a window of a scene of a volume in memory.
+pub(super) type DrawPart<'a> = dyn FnMut(Volume, &Scene, &Window) -> Result<(Part, Stats), RenderError> + 'a;
+
+/// A view of a volume that is read while it is drawn.
+#[derive(Clone, Debug)]
+pub(super) struct BoxedView {
+    volume: StreamedVolume,
+    scene: Scene,
+}
+
+impl BoxedView {
+    /// # Errors
+    /// If a setting of the scene is invalid, or not supported for a volume that is streamed.
+    pub(super) fn new(volume: StreamedVolume, scene: &Scene) -> Result<Self, RenderError> {
+        let scene = settled(&volume, scene)?;
+        Ok(Self { volume, scene })
+    }
+
+    pub(super) fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    pub(super) fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
+        self.scene = settled(&self.volume, scene)?;
+        Ok(())
+    }
+
+    pub(super) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
+        camera.check()?;
+        self.scene.camera = camera;
+        Ok(())
+    }
+
+    /// Draws a frame.
+    pub(super) fn draw(&self, draw: &mut DrawPart<'_>) -> Result<Rendering, RenderError> {
+        let start = Instant::now();
+        let size = [self.scene.image.width, self.scene.image.height];
+        let (parts, stats) = self.parts(&Window::whole(size), draw)?;
+        let image = Image::merge(parts).map_err(unmerged)?;
+        Ok(Rendering { image, stats: Stats { frame_ms: milliseconds_since(start), ..stats } })
+    }
+
+    /// Draws a part of the image.
+    pub(super) fn draw_part(&self, window: &Window, draw: &mut DrawPart<'_>) -> Result<(Part, Stats), RenderError> {
+        let start = Instant::now();
+        let (parts, stats) = self.parts(window, draw)?;
+        let part = side_by_side(parts, window);
+        Ok((part?, Stats { frame_ms: milliseconds_since(start), ..stats }))
+    }
+
+    /// The parts of a window, one for each region.
+    fn parts(&self, window: &Window, draw: &mut DrawPart<'_>) -> Result<(Vec<Part>, Stats), RenderError> {
+        let Self { volume, scene } = self;
+        part::check(&volume.sample, scene, window)?;
+        let scene = scene.explicit(&volume.sample);
+        let view =
+            ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height])?;
+        let mut walk = Walk {
+            identity: Identity::of((&volume.clone().into(), &scene), &view)?,
+            slabs: window.within(&view.slabs_of(volume.grid())),
+            chunks: Chunks::new(volume, &scene, &view)?,
+            scene,
+            draw,
+            parts: Vec::new(),
+            stats: Stats::default(),
+        };
+        for region in tiles(&window.region, SIDE) {
+            walk.region(region)?;
+        }
+        let Walk { chunks, parts, stats, .. } = walk;
+        let level = &volume.store.levels()[volume.level];
+        let store = StoreCounts {
+            level: volume.level as u64,
+            chunks_total: level.chunks().as_u64vec3().element_product(),
+            ..chunks.counts()
+        };
+        let counts = Counts { voxels_total: volume.grid().voxels(), ..stats.counts };
+        let (width, height) = (view.size[0], view.size[1]);
+        Ok((parts, Stats { store: Some(store), counts, width, height, ..stats }))
+    }
+}
+
+/// The drawing of some regions.
+struct Walk<'a, 'b> {
+    scene: Scene,
+    identity: Identity,
+    /// The slabs that are drawn.
+    slabs: Range<i32>,
+    chunks: Chunks<'a>,
+    draw: &'a mut DrawPart<'b>,
+    parts: Vec<Part>,
+    stats: Stats,
+}
+
+impl Walk<'_, '_> {
+    /// Draws a region, or where the voxels behind it fit into no memory, its quarters.
+    fn region(&mut self, region: Region) -> Result<(), RenderError> {
+        let mut drawn: Option<Part> = None;
+        let mut slab = self.slabs.start;
+        while slab < self.slabs.end && !drawn.as_ref().is_some_and(|part| self.is_opaque(&part.content)) {
+            let Some((slabs, found)) = self.chunks.deepest(&region, slab..self.slabs.end) else {
+                let side = region.width.max(region.height).div_ceil(2);
+                if side < LEAST_SIDE {
+                    return Err(self.chunks.too_large().into());
+                }
+                return tiles(&region, side).into_iter().try_for_each(|region| self.region(region));
+            };
+            slab = slabs.end;
+            let window = Window { slabs, region };
+            let next = match found.map_or(Ok(None), |found| self.chunks.read(found))? {
+                Some(volume) => self.part(volume, &window)?,
+                None => self.empty(&window),
+            };
+            drawn = Some(match drawn {
+                Some(front) => Part::join([front, next]).map_err(unmerged)?,
+                None => next,
+            });
+        }
+        let mut part = drawn.unwrap_or_else(|| self.empty(&Window { slabs: self.slabs.clone(), region }));
+        // What opaque pixels hide counts as drawn.
+        part.window.slabs.end = part.window.slabs.end.max(self.slabs.end);
+        self.parts.push(part);
+        Ok(())
+    }
+
+    /// Draws a window from the voxels that bear on it.
+    fn part(&mut self, volume: Volume, window: &Window) -> Result<Part, RenderError> {
+        let (part, stats) = (self.draw)(volume, &self.scene, window)?;
+        let (counts, prepare_ms) = (self.stats.counts, self.stats.prepare_ms);
+        self.stats = Stats { prepare_ms: prepare_ms + stats.prepare_ms, ..stats };
+        let own = std::mem::replace(&mut self.stats.counts, counts);
+        self.stats.counts.add_channel(&own);
+        Ok(Part { identity: self.identity.clone(), ..part })
+    }
+
+    /// A window that shows nothing.
+    fn empty(&self, window: &Window) -> Part {
+        let content = Content { colors: vec![[0.0; 4]; window.region.pixels()], extremes: Vec::new() };
+        Part { name: String::new(), identity: self.identity.clone(), window: window.clone(), content }
+    }
+
+    /// Whether nothing behind what is drawn can be seen.
+    fn is_opaque(&self, content: &Content) -> bool {
+        let splatting = &self.scene.splatting;
+        let enough = match splatting.compositing {
+            Compositing::Surface => 1.0,
+            _ => splatting.opacity_threshold as f32,
+        };
+        splatting.compositing.hides()
+            && splatting.culling
+            && splatting.order == Order::FrontToBack
+            && content.colors.iter().all(|color| color[3] >= enough)
+    }
+}
+
+/// The scene for a volume's sample, once its classification is known.
+fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<Scene, RenderError> {
+    scene.check()?;
+    scene.check_volume(&volume.sample)?;
+    scene.check_streamed(&volume.sample)?;
+    let classified = scene.classified(&volume.sample);
+    let splatting = &classified.splatting;
+    let by_length = matches!(splatting.compositing, Compositing::Minimum | Compositing::Average);
+    let by_range = splatting.compositing == Compositing::Maximum && splatting.classification == Classification::After;
+    if by_length || by_range {
+        // Along rays, all slabs of the whole volume count; and values of boxes are scaled by their own ranges.
+        let found = format!("{:?}", name_of(COMPOSITINGS, splatting.compositing));
+        let found = match by_range {
+            true => format!("{found} with splatting.classification = \"after\""),
+            false => found,
+        };
+        let found = format!("{found} for a volume that is streamed by this backend");
+        return Err(SettingError::new("splatting.compositing", found, "another one, or the cpu backend").into());
+    }
+    Ok(scene.clone())
+}
+
+/// The squares of some side, or what is left of them, that cover a region.
+fn tiles(region: &Region, side: u32) -> Vec<Region> {
+    let along = |start: u32, length: u32| (start..start + length).step_by(side as usize);
+    let rest = |at: u32, start: u32, length: u32| side.min(start + length - at);
+    let rows = along(region.y, region.height);
+    let row = |y: u32| {
+        let height = rest(y, region.y, region.height);
+        let tile = move |x: u32| Region { x, y, width: rest(x, region.x, region.width), height };
+        along(region.x, region.width).map(tile)
+    };
+    rows.flat_map(row).collect()
+}
+
+/// One part of the regions of a window.
+fn side_by_side(parts: Vec<Part>, window: &Window) -> Result<Part, RenderError> {
+    let Window { region, .. } = window;
+    let mut colors = vec![[0.0; 4]; region.pixels()];
+    let mut identity = None;
+    for part in parts {
+        let own = part.window.region;
+        for (row, y) in part.content.colors.chunks_exact(own.width as usize).zip(own.y - region.y..) {
+            let first = (own.x - region.x + y * region.width) as usize;
+            colors[first..first + row.len()].copy_from_slice(row);
+        }
+        identity = Some(part.identity);
+    }
+    let identity = identity.ok_or_else(|| RenderError::Readback("a window has no region".to_owned()))?;
+    let content = Content { colors, extremes: Vec::new() };
+    Ok(Part::named(identity, window.clone(), content))
+}
+
+/// Parts of one walk merge.
+fn unmerged(error: MergeError) -> RenderError {
+    RenderError::Readback(error.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_a_region_once() {
+        let region = Region { x: 5, y: 7, width: 21, height: 9 };
+        let all = tiles(&region, 8);
+        assert_eq!(all.iter().map(Region::pixels).sum::<usize>(), region.pixels());
+        assert_eq!(all.len(), 6);
+        for (at, tile) in all.iter().enumerate() {
+            assert!(tile.columns().start >= 5 && tile.columns().end <= 26 && tile.rows().end <= 16, "{tile}");
+            assert!(all[..at].iter().all(|other| !other.overlaps(tile)), "{tile}");
+        }
+    }
+}

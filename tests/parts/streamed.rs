@@ -1,0 +1,148 @@
+//! Volumes that are read box by box while a backend draws windows of them: the image of the volume in memory, to rounding.
+
+use std::sync::Arc;
+
+use glam::{DVec3, UVec3};
+use sheetsplat::Image;
+use sheetsplat::headless::Backend;
+use sheetsplat::scene::Scene;
+use sheetsplat::settings::{Region, Window};
+use sheetsplat::stats::StoreCounts;
+use sheetsplat::volume::{IndexedStore, Store, StoreIndex, StreamedVolume, Volume, builtin};
+
+use crate::common::compare::assert_at_least;
+use crate::common::images::{largest_difference, psnr};
+use crate::common::store::MemoryStore;
+use crate::merging::headless;
+
+/// A scene of a head's values, without its labels.
+fn head(size: u32, sets: &[&str]) -> (Volume, Scene) {
+    let volume = builtin::volume(&format!("head:{size}")).unwrap();
+    let volume = Volume::new("head", volume.dims(), volume.spacing(), volume.values().to_vec()).unwrap();
+    let always = [
+        "image={width=61,height=47,background=[0.2,0.4,0.6,0.5]}",
+        "camera={direction=[0.4,0.9,-0.3],fit=\"volume\"}",
+        "splatting={opacity_threshold=1,classification=\"before\"}",
+        "transfer={color=[[0,[0.3,0.5,0.9]],[255,[1,0.8,0.4]]],opacity=[[0,0],[40,0.02],[160,0.5]]}",
+    ];
+    let sets: Vec<String> = always.iter().chain(sets).map(|&set| set.to_owned()).collect();
+    let source = sheetsplat::scene::VolumeSource::Builtin("head".to_owned());
+    (volume, Scene::from_volume(source, &sets).unwrap())
+}
+
+fn streamed(volume: &Volume, store: impl Store + 'static, memory: u64) -> StreamedVolume {
+    StreamedVolume { store: Arc::new(store), level: 0, sample: Arc::new(volume.clone()), memory }
+}
+
+/// Draws a volume in boxes of at most 256 KiB and asserts that the image is that of the volume in memory.
+fn assert_same(backend: Backend, size: u32, sets: &[&str]) -> StoreCounts {
+    assert_same_with(backend, size, sets, 1 << 20)
+}
+
+/// As [`assert_same`], with boxes of a quarter of some bytes.
+fn assert_same_with(backend: Backend, size: u32, sets: &[&str], memory: u64) -> StoreCounts {
+    let (volume, scene) = head(size, sets);
+    let headless = headless(backend);
+    let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
+    let store = MemoryStore::new(&volume, UVec3::new(8, 12, 10));
+    let drawn = headless.render_volume(streamed(&volume, store, memory), &scene).unwrap();
+    assert_eq!((drawn.stats.backend.as_str(), drawn.stats.width), (backend.name(), 61));
+    let name = format!("{backend} {sets:?}");
+    assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, name);
+    let counts = drawn.stats.store.unwrap();
+    assert!(counts.chunks_read > 0 && counts.chunk_bytes <= memory / 4, "{sets:?} {counts:?}");
+    assert!(counts.chunk_bytes < size_of_val(volume.values()) as u64 / 2, "{sets:?} {counts:?}");
+    counts
+}
+
+const SCENES: [&[&str]; 8] = [
+    &[],
+    &["splatting.compositing=exponential", "splatting.classification=after"],
+    &["camera.projection=perspective", "camera.direction=[1,0.2,0.1]"],
+    &["camera.projection=perspective", "splatting.classification=after", "splatting.slab_width=0.7"],
+    &["splatting.compositing=xray", "splatting.classification=after", "shading.gradient=kernel"],
+    &["splatting.compositing=surface", "splatting.radius=1.4"],
+    &["splatting.compositing=surface", "splatting.classification=after", "clip.planes=[[0.5,0.3,1,2]]"],
+    &["splatting.compositing=maximum", "splatting.order=back-to-front"],
+];
+
+#[test]
+fn boxes_by_the_f64_evaluation_are_the_volume_in_memory() {
+    for sets in SCENES {
+        assert_same(Backend::Reference, 64, sets);
+    }
+}
+
+#[test]
+fn boxes_by_the_gpu_are_the_volume_in_memory() {
+    for sets in [SCENES[0], SCENES[1], SCENES[3], SCENES[6]] {
+        assert_same(Backend::Gpu, 64, sets);
+    }
+}
+
+/// What opaque pixels hide, what the store does not hold, and what an index tells to be invisible is not read.
+#[test]
+fn boxes_that_show_nothing_are_not_read() {
+    let opaque = "transfer={color=[[0,[0.3,0.5,0.9]],[255,[1,0.8,0.4]]],opacity=[[60,0],[61,1]]}";
+    let near = ["camera.height=9", "splatting.opacity_threshold=0.95", opaque];
+    let hidden = assert_same_with(Backend::Reference, 64, &near, 1 << 18);
+    let all = assert_same_with(Backend::Reference, 64, &[near[0], "splatting.culling=false", opaque], 1 << 18);
+    assert!(hidden.chunks_read * 3 < all.chunks_read * 2, "{hidden:?} {all:?}");
+
+    // A bright block in a corner of a volume that the store holds everywhere.
+    let (_, scene) = head(8, &["transfer.opacity=[[180,0],[200,1]]"]);
+    let bright = |index: u32| [index % 60, index / 60 % 60, index / 3600].iter().all(|&n| n < 9);
+    let values = (0..60 * 60 * 60).map(|index| if bright(index) { 200.0 } else { 20.0 }).collect();
+    let volume = Volume::new("block", UVec3::splat(60), DVec3::ONE, values).unwrap();
+    let store = || MemoryStore::new(&volume, UVec3::splat(12));
+    let index = StoreIndex::new(&store(), "store", &|| {}).unwrap();
+    let indexed = IndexedStore::new(Arc::new(store()), index, "index").unwrap();
+    let headless = headless(Backend::Reference);
+    let plain = headless.render_volume(streamed(&volume, store(), 1 << 20), &scene).unwrap();
+    let told = headless.render_volume(streamed(&volume, indexed, 1 << 20), &scene).unwrap();
+    assert!(largest_difference(&plain.image, &told.image) < 1e-6);
+    assert!(plain.image.pixels.iter().any(|pixel| pixel[3] > 0.9));
+    let read = [plain, told].map(|drawn| drawn.stats.store.unwrap().chunks_read);
+    assert!(read[1] < read[0], "{read:?}");
+}
+
+#[test]
+fn parts_of_boxes_merge() {
+    let (volume, scene) = head(64, &["splatting.classification=after"]);
+    let headless = headless(Backend::Reference);
+    let store = MemoryStore::new(&volume, UVec3::splat(12));
+    let mut view = headless.view(streamed(&volume, store, 1 << 20), &scene).unwrap();
+    let whole = headless.draw(&mut view).unwrap().image;
+    let mut parts = Vec::new();
+    for slabs in [-1000..-3, -3..1000] {
+        for (x, width) in [(0, 25), (25, 36)] {
+            let window = Window { slabs: slabs.clone(), region: Region { x, y: 0, width, height: 47 } };
+            parts.push(headless.draw_part(&mut view, &window).unwrap().0);
+        }
+    }
+    assert!(largest_difference(&Image::merge(parts).unwrap(), &whole) < 1e-6);
+}
+
+#[test]
+fn what_boxes_cannot_show_is_refused() {
+    let headless = headless(Backend::Reference);
+    let (volume, scene) = head(24, &[]);
+    let store = || MemoryStore::new(&volume, UVec3::splat(12));
+    for (settings, found) in [
+        (
+            "classification=\"after\",compositing=\"maximum\"",
+            "\"maximum\" with splatting.classification = \"after\" for a",
+        ),
+        ("compositing=\"minimum\"", "\"minimum\" for a volume that is streamed by this backend"),
+        ("compositing=\"average\"", "\"average\" for a volume that is streamed by this backend"),
+    ] {
+        let (_, scene) = head(24, &[&format!("splatting={{{settings}}}")]);
+        let error = headless.view(streamed(&volume, store(), 1 << 20), &scene).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("splatting.compositing: found {found}")), "{error}");
+    }
+    let error = headless.render_volume(streamed(&volume, store(), 1 << 10), &scene).unwrap_err().to_string();
+    assert!(error.starts_with("volume.level: found 0, in which few pixels see a box of more than 256"), "{error}");
+    let broken = MemoryStore { broken_from: Some(10), ..store() };
+    let error = headless.render_volume(streamed(&volume, broken, 1 << 20), &scene).unwrap_err().to_string();
+    assert_eq!(error, "store: the disk is gone");
+}
