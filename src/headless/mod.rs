@@ -152,7 +152,6 @@ impl Headless {
             (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => {
                 view.draw_part(window, &mut |volume, scene, window| self.draw_box(volume, scene, window))
             }
-            #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
         Ok((part, Stats { store: stats.store.or(reads), ..stats }))
@@ -223,7 +222,6 @@ impl Headless {
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.set_scene(scene),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.set_scene(scene),
             (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => view.set_scene(scene),
-            #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }
     }
@@ -245,7 +243,6 @@ impl Headless {
             (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => {
                 view.draw(&mut |volume, scene, window| self.draw_box(volume, scene, window))
             }
-            #[cfg(any(feature = "gpu", feature = "cpu"))]
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
         let store = rendering.stats.store.or(reads);
@@ -266,8 +263,9 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(_)) if self.draws_by_cpu() => Err(view::streamed_first_hits().into()),
             (Drawer::Reference, ViewBackend::Reference(view)) => Ok(view.pick(pixel)?),
-            (_, ViewBackend::Boxed(..)) => Err(view::streamed_first_hits().into()),
-            #[cfg(any(feature = "gpu", feature = "cpu"))]
+            (_, ViewBackend::Boxed(_, backend)) if *backend == self.backend() => {
+                Err(view::streamed_first_hits().into())
+            }
             (_, other) => Err(self.refuse(other.backend()).into()),
         }
     }
@@ -282,7 +280,6 @@ impl Headless {
         matches!(self.drawer, Drawer::Cpu)
     }
 
-    #[cfg(any(feature = "gpu", feature = "cpu"))]
     fn refuse(&self, found: Backend) -> SettingError {
         SettingError::new(
             "view",

@@ -35,7 +35,6 @@ pub(super) enum ViewBackend {
     Boxed(Box<BoxedView>, Backend),
 }
 
-#[cfg(any(feature = "gpu", feature = "cpu"))]
 impl ViewBackend {
     pub(super) fn backend(&self) -> Backend {
         match self {

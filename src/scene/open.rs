@@ -27,14 +27,6 @@ impl OpenVolume {
         }
     }
 
-    /// The number of times in the file, of which the volume is one.
-    pub fn times(&self) -> u32 {
-        match self {
-            Self::Whole(volume) => volume.encoding().map_or(1, |encoding| encoding.times),
-            Self::Streamed(volume) => volume.store.times(),
-        }
-    }
-
     /// The number of the level that is drawn, 0 for the finest.
     pub fn level(&self) -> u32 {
         match self {

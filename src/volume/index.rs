@@ -7,7 +7,7 @@ use glam::UVec3;
 use rayon::prelude::*;
 
 use super::range::{EMPTY, union};
-use super::{Store, StoreLevel, VolumeError};
+use super::{Store, StoreFacts, StoreLevel, VolumeError};
 
 /// The first line of a file.
 const TITLE: &str = "sheetsplat index 1";
@@ -213,8 +213,8 @@ impl Store for IndexedStore {
         ranges.get((chunk.x + chunks.x * (chunk.y + chunks.y * chunk.z)) as usize).copied()
     }
 
-    fn times(&self) -> u32 {
-        self.store.times()
+    fn facts(&self) -> StoreFacts {
+        self.store.facts()
     }
 
     fn identity(&self) -> String {

@@ -9,7 +9,7 @@ use super::display::ChannelDisplay;
 use super::samples::SampleType;
 use super::series::Series;
 use super::source::invalid;
-use super::{Grid, Orientation, VolumeError};
+use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
 use crate::stats::StoreCounts;
 
 /// The contents of a file of values or labels.
@@ -70,6 +70,22 @@ impl<T> Loaded<T> {
             displays,
             levels,
             values,
+        }
+    }
+
+    /// What the file, of some format, states about one of its channels.
+    pub(super) fn facts(&self, format: &'static str, channel: usize) -> StoreFacts {
+        let Self { series, unit, orientation, palette, label_names, .. } = self;
+        let channels = if series.is_color { 1 } else { series.channels };
+        let display = self.displays.get(channel).filter(|display| **display != ChannelDisplay::default());
+        StoreFacts {
+            encoding: Some(Encoding { format, sample_type: self.kind, channels, times: series.times }),
+            unit: unit.clone(),
+            orientation: *orientation,
+            palette: palette.clone(),
+            label_names: label_names.clone(),
+            channel_name: self.channel_names.get(channel).cloned(),
+            display: display.cloned(),
         }
     }
 

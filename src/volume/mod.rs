@@ -81,7 +81,7 @@ pub use sample::sample;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 pub(crate) use series::Selection;
-pub use store::{Store, StoreLevel, open_raw_store, open_store};
+pub use store::{Store, StoreFacts, StoreLevel, open_raw_store, open_store};
 pub(crate) use store::{raw_store, store};
 pub use streamed::StreamedVolume;
 
@@ -235,39 +235,48 @@ impl Volume {
 
     pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let (format, loaded) = format::read(path, access)?;
-        let Loaded { dims, kind: sample_type, spacing, unit, orientation, palette, label_names, .. } = loaded;
-        let Loaded { series, channel_names, displays, levels, mut values, .. } = loaded;
+        let first_channel = access.selection().channel.unwrap_or(0) as usize;
+        let channels = first_channel..(loaded.series.channels as usize).max(first_channel + 1);
+        let facts: Vec<StoreFacts> = channels.map(|channel| loaded.facts(format, channel)).collect();
+        let mut facts = facts.into_iter();
+        let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();
-        let channels = if series.is_color { 1 } else { series.channels };
-        let encoding = Some(Encoding { format, sample_type, channels, times: series.times });
         let spacing = spacing.unwrap_or(DVec3::ONE);
         if series.is_color {
             let volume = Self::from_components(&origin, dims, spacing, (&values, sample_type))?;
-            return Self { unit, encoding, label_names, ..volume }.with_orientation(&origin, orientation);
+            let facts = facts.next().unwrap_or_default();
+            return volume.stating(&origin, StoreFacts { palette: None, channel_name: None, display: None, ..facts });
         }
         // All channels' values, one after the other.
         let voxels = dims.element_product() as usize;
-        let first_channel = access.selection().channel.unwrap_or(0) as usize;
-        let mut names = channel_names.into_iter().skip(first_channel);
-        let mut displays = displays.into_iter().skip(first_channel);
         let mut further = Vec::new();
         while values.len() > voxels {
             further.push(values.split_off(values.len() - voxels));
         }
         values.shrink_to_fit();
         let mut channel = |values: Vec<f32>| {
-            let volume = Self::new(&origin, dims, spacing, values)?;
-            let display = displays.next().filter(|display| *display != ChannelDisplay::default());
-            Ok(Self { unit: unit.clone(), encoding, channel_name: names.next(), display, ..volume })
+            Self::new(&origin, dims, spacing, values)?.stating(&origin, facts.next().unwrap_or_default())
         };
-        let first = channel(values)?;
-        let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
-        let mut first = Self { palette, label_names, ..first };
+        let mut first = channel(values)?;
+        // What concerns all channels is the first one's.
+        let further = further
+            .into_iter()
+            .rev()
+            .map(channel)
+            .map(|channel| Ok(Self { palette: None, label_names: BTreeMap::new(), orientation: None, ..channel? }));
+        let further = further.collect::<Result<_, VolumeError>>()?;
         if let Some(Levels { dims, level, grid, reads }) = levels {
             grid.check().map_err(|error| refused(&origin, error))?;
             (first.grid, first.levels, first.level, first.reads) = (grid, dims, level, Some(reads));
         }
-        first.with_channels(&origin, further)?.with_orientation(&origin, orientation)
+        first.with_channels(&origin, further)
+    }
+
+    /// The same volume with what its file states beside its grid and values.
+    fn stating(self, origin: &str, facts: StoreFacts) -> Result<Self, VolumeError> {
+        let StoreFacts { encoding, unit, orientation, palette, label_names, channel_name, display } = facts;
+        Self { encoding, unit, palette, label_names, channel_name, display, ..self }
+            .with_orientation(origin, orientation)
     }
 
     /// The number of voxels along x, y and z of each level that the volume's store holds, from the finest; empty if it comes from no such store.

@@ -9,6 +9,9 @@ use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::source::invalid;
 use super::{Encoding, Volume, VolumeError};
 
+/// The format's name.
+pub(super) const FORMAT: &str = "raw";
+
 /// The layout of a raw file, which has no header.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RawLayout {
@@ -49,6 +52,6 @@ impl Volume {
         stream.skip(offset)?;
         let values = stream.samples(&Samples { kind, dims, big_endian, rescale: None, z_fastest: false }, false)?;
         let volume = Self::new(&path.display().to_string(), dims, DVec3::ONE, values)?;
-        Ok(Self { encoding: Some(Encoding { format: "raw", sample_type: kind, channels: 1, times: 1 }), ..volume })
+        Ok(Self { encoding: Some(Encoding { format: FORMAT, sample_type: kind, channels: 1, times: 1 }), ..volume })
     }
 }

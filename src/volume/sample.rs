@@ -39,7 +39,7 @@ pub fn sample(origin: &str, store: &dyn Store, memory: u64) -> Result<Volume, Vo
     let grid = Grid::new(dims, spacing);
     let place: DVec3 = level.grid.place() + center(&grid) - center(&level.grid);
     let grid = if number == 0 && step == 1 { level.grid } else { grid.coarser_than(&levels[0].grid, place) };
-    Ok(Volume { holes, ..Volume::piece(grid, values) })
+    Volume { holes, ..Volume::piece(grid, values) }.stating(origin, store.facts())
 }
 
 /// Every `step`th voxel of a level, chunk by chunk: the first voxel of each piece in the sample, the piece's dimensions, and its values.

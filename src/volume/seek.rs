@@ -12,7 +12,7 @@ use super::samples::Samples;
 use super::series::{Series, SeriesOrder};
 use super::source::{invalid, io_error};
 use super::store::{Store, StoreLevel, check_box, check_chunk};
-use super::{Grid, VolumeError};
+use super::{Grid, StoreFacts, VolumeError};
 
 /// The sizes of a chunk, unless the volume is smaller: any box can be read, so these only divide it into parts of a convenient size.
 const CHUNK: u32 = 64;
@@ -43,6 +43,7 @@ pub(super) struct FileStore {
     /// The number of samples from one voxel to the next, and the sample of the first voxel.
     step: u64,
     first: u64,
+    facts: StoreFacts,
     identity: String,
 }
 
@@ -50,12 +51,13 @@ impl FileStore {
     /// The store of a file whose header was read, of which `notes` tells where the samples are.
     pub(super) fn of_header(
         path: &Path,
-        loaded: &Loaded<f32>,
+        (format, loaded): (&'static str, &Loaded<f32>),
         notes: &[Located],
         access: &Access,
     ) -> Result<Self, VolumeError> {
+        let facts = loaded.facts(format, access.selection().channel.unwrap_or(0) as usize);
         match notes {
-            [located] => Self::new(located.clone(), loaded.spacing.unwrap_or(DVec3::ONE), access),
+            [located] => Self::new(located.clone(), loaded.spacing.unwrap_or(DVec3::ONE), facts, access),
             _ => {
                 let found = format!("{} places", notes.len());
                 Err(invalid(path, "data", found, "one stretch of uncompressed samples, x fastest"))
@@ -63,7 +65,12 @@ impl FileStore {
         }
     }
 
-    pub(super) fn new(located: Located, spacing: DVec3, access: &Access) -> Result<Self, VolumeError> {
+    pub(super) fn new(
+        located: Located,
+        spacing: DVec3,
+        facts: StoreFacts,
+        access: &Access,
+    ) -> Result<Self, VolumeError> {
         let Located { path, samples, series, .. } = &located;
         let selection = access.selection();
         series.check(path, selection)?;
@@ -87,6 +94,7 @@ impl FileStore {
             step,
             first,
             identity: String::new(),
+            facts,
             located: located.clone(),
         };
         store.identity = store.hash()?;
@@ -164,8 +172,8 @@ impl Store for FileStore {
         f32::NAN
     }
 
-    fn times(&self) -> u32 {
-        self.located.series.times
+    fn facts(&self) -> StoreFacts {
+        self.facts.clone()
     }
 
     fn identity(&self) -> String {

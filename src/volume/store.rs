@@ -1,5 +1,6 @@
 //! Volumes that are read by boxes, level by level (SPEC §13).
 
+use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::path::Path;
 use std::sync::Arc;
@@ -8,11 +9,12 @@ use glam::{DVec3, UVec3};
 
 use super::access::{Access, ReadOptions};
 use super::format;
+use super::raw;
 use super::samples::{SIZES, Samples, dims_of};
 use super::seek::{FileStore, Located};
 use super::series::Series;
 use super::source::invalid;
-use super::{Grid, RawLayout, VolumeError};
+use super::{ChannelDisplay, Encoding, Grid, Orientation, RawLayout, VolumeError};
 
 /// A volume that is read by boxes (SPEC §13): one channel at one time.
 ///
@@ -49,13 +51,33 @@ pub trait Store: Send + Sync + Debug {
         None
     }
 
-    /// The number of times in the file, of which the store is one.
-    fn times(&self) -> u32 {
-        1
+    /// What the file states beside grids and values.
+    fn facts(&self) -> StoreFacts {
+        StoreFacts::default()
     }
 
     /// A hash, as hexadecimal digits, of what identifies the store's values: its metadata, never paths or times.
     fn identity(&self) -> String;
+}
+
+/// What a file states about a volume beside its grid and values.
+#[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct StoreFacts {
+    /// How the values are stored.
+    pub encoding: Option<Encoding>,
+    /// The name of the world unit.
+    pub unit: Option<String>,
+    /// How the volume lies in the patient.
+    pub orientation: Option<Orientation>,
+    /// The colours (red, green and blue in [0, 1]) of values, in ascending order.
+    pub palette: Option<Vec<(f64, DVec3)>>,
+    /// The names of values, if they are labels.
+    pub label_names: BTreeMap<u16, String>,
+    /// The channel's name.
+    pub channel_name: Option<String>,
+    /// How the channel is shown.
+    pub display: Option<ChannelDisplay>,
 }
 
 /// A level of a [`Store`]: the volume at one resolution.
@@ -108,7 +130,9 @@ pub(crate) fn raw_store(path: &Path, layout: &RawLayout, access: &Access) -> Res
         return Err(samples.mismatch(path, left));
     }
     let located = Located { path: path.to_owned(), at, samples, series: Series::default() };
-    Ok(Arc::new(FileStore::new(located, DVec3::ONE, access)?))
+    let encoding = Encoding { format: raw::FORMAT, sample_type: kind, channels: 1, times: 1 };
+    let facts = StoreFacts { encoding: Some(encoding), ..StoreFacts::default() };
+    Ok(Arc::new(FileStore::new(located, DVec3::ONE, facts, access)?))
 }
 
 /// Checks that a box lies in a level, and that there is a value for each of its voxels.

@@ -122,11 +122,11 @@ fn levels_larger_than_memory_are_streamed() {
         .run_with(
             &two,
             "",
-            &format!("render {ball} --backend reference -o no.npy --set image={{width=100,height=100}}"),
+            &format!("render {ball} --backend reference -o no.npy --set image={{width=100,height=100}} --set splatting.compositing=minimum"),
         )
         .assert_failure(
             2,
-            &["volume: found a volume that is streamed, with the reference backend, allowed: the cpu backend, a level that fits"],
+            &["splatting.compositing: found \"minimum\" for a volume that is streamed by this backend, allowed: another"],
         );
     assert!(!folder.path("no.npy").exists());
 }

@@ -1,6 +1,6 @@
 //! Volumes that are larger than `--memory`.
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::*;
 
@@ -56,8 +56,8 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
     run("--set splatting.classification=after --backend cpu -o after.png").assert_success();
     run("--set splatting.classification=after --set splatting.interpolation=exact --backend cpu -o no.png")
         .assert_failure(2, &["splatting.interpolation: found \"exact\" for a volume that is streamed, allowed: "]);
-    run("--backend reference -o no.png")
-        .assert_failure(2, &["volume: found a volume that is streamed, with the reference backend, allowed: the cpu"]);
+    run("--set splatting.compositing=average --backend reference -o no.png")
+        .assert_failure(2, &["splatting.compositing: found \"average\" for a volume that is streamed by this backend"]);
     folder
         .run_with(&two, "", &format!("render {ball} --backend cpu --memory 3MiB -o no.png"))
         .assert_failure(2, &["bytes of memory, allowed: at most the memory limit of 3145728 bytes"]);
@@ -101,6 +101,12 @@ fn everything_is_drawn_of_a_volume_larger_than_memory() {
         folder.run(&format!("merge {} -o {name}-merged.npy", parts.join(" "))).assert_success();
     }
     assert_same(&["-merged.npy"]);
+    // Facts are told by a sample.
+    let info = folder.run_with(&two, "", &format!("info {ball} --json --memory 17MiB"));
+    let info: Value = serde_json::from_str(&info.stdout).unwrap();
+    assert_eq!((info["dims"].clone(), info["type"].clone()), (json!([192, 160, 155]), json!("uint8")));
+    assert_eq!((info["format"].clone(), info["sample"].clone()), (json!("raw"), json!([64, 54, 52])));
+    assert!(info["max"].as_f64().unwrap() > 200.0, "{info}");
     // Parts of a store and of its values do not mix, as only the latter are known value by value.
     let mixed = "streamed-0.exr whole-1.exr whole-2.exr whole-3.exr whole-4.exr whole-5.exr";
     folder

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sheetsplat::volume::{RawLayout, ReadOptions, SampleType, Store, open_raw_store, open_store};
+use sheetsplat::volume::{RawLayout, ReadOptions, SampleType, Store, open_raw_store, open_store, sample};
 
 use crate::*;
 
@@ -23,6 +23,8 @@ fn assert_holds(store: &Arc<dyn Store>, volume: &Volume, name: &str) {
         let is_same = |(index, value): (u32, &f32)| *value == volume.value(at(index));
         assert!((0..).zip(&found).all(is_same), "{name}, {dims} from {from}: {found:?}");
     }
+    // All of them, with whatever else the file states.
+    assert!(sample(name, &**store, u64::MAX).unwrap() == *volume, "{name}: {:?}", store.facts());
 }
 
 #[test]

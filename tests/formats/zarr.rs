@@ -4,7 +4,7 @@ use std::fs;
 
 use glam::{DVec3, UVec3};
 use serde_json::{Value, json};
-use sheetsplat::volume::{Labels, ReadOptions, SampleType, Volume, VolumeError, open_store};
+use sheetsplat::volume::{Labels, ReadOptions, SampleType, Volume, VolumeError, open_store, sample};
 
 use super::{DIMS, Folder, SPACING, assert_warned, fixture, open, values, warned};
 
@@ -167,6 +167,12 @@ fn stores_are_read_by_boxes() {
     assert_error(store.read(2, UVec3::ZERO, UVec3::ONE, &mut [0.0]), "level", &["found 2", "0 to 1"]);
     let refused = open_store(&fixture("zarr/image-0.5.zarr"), &ReadOptions::default());
     assert_error(refused, "channels", &["found 2", "0 to 1"]);
+    // Whatever the metadata state, a sample has, too.
+    let whole = Volume::open_with(&fixture("zarr/image-0.5.zarr"), &options).unwrap();
+    let sampled = sample("store", &*store, u64::MAX).unwrap();
+    assert!(sampled.values() == whole.values() && whole.display().is_some());
+    assert_eq!((sampled.display(), sampled.channel_name()), (whole.display(), whole.channel_name()));
+    assert_eq!((sampled.unit(), sampled.encoding()), (whole.unit(), whole.encoding()));
     // The identity does not depend on the place, but on what is read.
     let other = open_store(&fixture("zarr/image-0.5.zarr"), &options.clone().with_time(0)).unwrap();
     let again = open_store(&fixture("zarr/../zarr/image-0.5.zarr"), &options).unwrap();

@@ -218,6 +218,7 @@ impl Input {
     }
 
     /// Loads the scene's volume, which must fit into memory, from files that are not outputs.
+    #[cfg(feature = "viewer")]
     pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
         let start = Instant::now();
         let loaded = scene.load_volume_and_files(&self.reading.options());

@@ -12,6 +12,7 @@ use super::super::access::Access;
 use super::super::display::ChannelDisplay;
 use super::super::format::archive_and_inner;
 use super::super::grid::{Grid, check_spacing};
+use super::super::loaded::Loaded;
 use super::super::refused;
 use super::super::series::{MAX_CHANNELS, Series};
 use super::super::source::invalid;
@@ -111,6 +112,20 @@ impl Image {
             return Self::plain(keys);
         }
         Self::of_node(keys, &root, "")
+    }
+
+    /// Values of a level with what the metadata state about all of them.
+    pub(super) fn stated<T>(&self, level: usize, values: Vec<T>) -> Loaded<T> {
+        let Level { array, grid } = &self.levels[level];
+        Loaded {
+            unit: self.unit.clone(),
+            series: self.series,
+            channel_names: self.channel_names.clone(),
+            displays: self.displays.clone(),
+            label_names: self.label_names.clone(),
+            palette: self.palette.clone(),
+            ..Loaded::new(grid.dims, array.kind, values)
+        }
     }
 
     /// An array without further metadata, whose voxels are as far apart along all axes.

@@ -28,7 +28,7 @@ use super::loaded::{Levels, Loaded};
 use super::samples::{SIZES, Voxel, dims_of};
 use super::source::invalid;
 use super::store::{Store, StoreLevel, check_box, check_chunk};
-use super::{Grid, VolumeError};
+use super::{Grid, StoreFacts, VolumeError};
 use crate::stats::StoreCounts;
 
 /// Reads an image at one level.
@@ -60,12 +60,10 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         bytes_read: held.bytes,
         chunk_bytes: count * size_of::<T>() as u64,
     };
-    let (spacing, kind) = (Some(level.grid.spacing), level.array.kind);
+    let spacing = Some(level.grid.spacing);
     let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
     let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid, reads });
-    let Image { unit, series, channel_names, displays, label_names, palette, .. } = image;
-    let loaded = Loaded::new(dims, kind, values);
-    Ok(Loaded { spacing, unit, series, channel_names, displays, label_names, palette, levels, ..loaded })
+    Ok(Loaded { spacing, levels, ..image.stated(number, values) })
 }
 
 /// The grids of an image's levels, from the finest.
@@ -104,8 +102,8 @@ fn level_of(image: &Image, channels: u64, bytes: usize, path: &Path, access: &Ac
     Err(invalid(path, "level", found, allowed))
 }
 
-/// Opens one channel of an image at one time.
-pub(super) fn open(path: &Path, access: &Access) -> Result<ZarrStore, VolumeError> {
+/// Opens one channel of an image at one time. `format` is the name of the format.
+pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result<ZarrStore, VolumeError> {
     let image = Image::open(path, access)?;
     let selection = access.selection();
     image.series.check(path, selection)?;
@@ -120,7 +118,8 @@ pub(super) fn open(path: &Path, access: &Access) -> Result<ZarrStore, VolumeErro
     let levels =
         image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() }).collect();
     let (channel, time) = (u64::from(channels.start), u64::from(selection.time.unwrap_or(0)));
-    Ok(ZarrStore { image, levels, channel, time })
+    let facts = image.stated::<f32>(0, Vec::new()).facts(format, channel as usize);
+    Ok(ZarrStore { image, levels, channel, time, facts })
 }
 
 /// One channel of an image at one time, read by boxes.
@@ -130,6 +129,7 @@ pub(super) struct ZarrStore {
     levels: Vec<StoreLevel>,
     channel: u64,
     time: u64,
+    facts: StoreFacts,
 }
 
 impl Store for ZarrStore {
@@ -152,8 +152,8 @@ impl Store for ZarrStore {
         self.image.levels[0].array.fill()
     }
 
-    fn times(&self) -> u32 {
-        self.image.series.times
+    fn facts(&self) -> StoreFacts {
+        self.facts.clone()
     }
 
     fn identity(&self) -> String {

@@ -7,9 +7,9 @@ use std::fmt::Write;
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use sheetsplat::appearance::{Preset, quantiles};
-use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::scene::{OpenVolume, Scene, VolumeSource};
 use sheetsplat::settings::{Camera, Projection};
-use sheetsplat::volume::{Orientation, SampleType, Volume};
+use sheetsplat::volume::{Orientation, SampleType, StreamedVolume, Volume};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
@@ -51,6 +51,8 @@ const ROWS: usize = 8;
 struct Info {
     format: &'static str,
     dims: [u32; 3],
+    /// The size of the sample that values below are from, where the volume does not fit into memory; `None` if they are from all of it.
+    sample: Option<[u32; 3]>,
     r#type: String,
     spacing: [f64; 3],
     unit: Option<String>,
@@ -101,24 +103,25 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let scene = input.scene()?;
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     // What is told is about the volume itself, whatever a picture would show of it.
-    let volume = input.load_volume(&at_finest_level(&scene), &outputs)?;
-    let scene = input.settled(&volume, &scene, Scene::explicit)?;
-    let suggested = Preset::suggested(&volume);
+    let opened = input.open_volume(&at_finest_level(&scene), &outputs)?;
+    let volume = opened.sample();
+    let scene = input.settled(volume, &scene, Scene::explicit)?;
+    let suggested = Preset::suggested(volume);
     let [min, max, mean] = extent_and_mean(volume.values());
     let percentiles = quantiles(volume.values(), |_| true, PERCENTILES.map(|(percent, _)| percent / 100.0));
     let encoding = volume.encoding();
     let info = Info {
         format: encoding.map_or("builtin", |encoding| encoding.format),
-        dims: volume.dims().to_array(),
+        dims: opened.grid().dims.to_array(),
+        sample: matches!(opened, OpenVolume::Streamed(_)).then(|| volume.dims().to_array()),
         r#type: encoding.map_or(SampleType::F32, |encoding| encoding.sample_type).to_string(),
-        spacing: volume.spacing().to_array(),
+        spacing: opened.grid().spacing.to_array(),
         unit: volume.unit().map(str::to_owned),
         channels: encoding.map_or(1, |encoding| encoding.channels).max(volume.channels().count() as u32),
         colors: volume.colors().is_some(),
         times: encoding.map_or(1, |encoding| encoding.times),
-        levels: Some(volume.levels().iter().map(|dims| dims.to_array()).collect())
-            .filter(|levels: &Vec<_>| !levels.is_empty()),
-        level: volume.level(),
+        levels: Some(levels(&opened)).filter(|levels| !levels.is_empty()),
+        level: opened.level(),
         holes: volume.holes(),
         min,
         max,
@@ -130,9 +133,19 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = if arguments.json {
         serde_json::to_string(&info).map_err(|error| Failure::Other(error.to_string()))? + "\n"
     } else {
-        described(&info, &volume, scene.index.unwrap_or(0))
+        described(&info, volume, scene.index.unwrap_or(0))
     };
     stdout(text.as_bytes())
+}
+
+/// The sizes of the levels of a store with levels.
+fn levels(volume: &OpenVolume) -> Vec<[u32; 3]> {
+    match volume {
+        OpenVolume::Whole(volume) => volume.levels().iter().map(|dims| dims.to_array()).collect(),
+        OpenVolume::Streamed(StreamedVolume { store, .. }) => {
+            store.levels().iter().map(|level| level.grid.dims.to_array()).collect()
+        }
+    }
 }
 
 /// The scene with the finest level stated of every file whose level is open.
@@ -178,6 +191,12 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
         let sizes = levels.iter().zip(0..).map(|([x, y, z], level)| format!("{level}: {x} × {y} × {z}"));
         let sizes = sizes.collect::<Vec<_>>().join(", ");
         line("levels", format!("{sizes}; what is told is about {}, by --level", info.level));
+    }
+    if let Some([x, y, z]) = info.sample {
+        line(
+            "sample",
+            format!("{x} × {y} × {z}, as the volume does not fit into memory; values below are the sample's"),
+        );
     }
     line("orientation", volume.orientation().map_or("not given".to_owned(), orientation));
     if info.holes > 0 {

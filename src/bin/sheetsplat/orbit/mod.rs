@@ -161,7 +161,7 @@ impl<'a> Shown<'a> {
         let Arguments { input, annotate, .. } = arguments;
         let scene = input.choose_levels(&scene, Scene::explicit_all_around)?;
         let volume = input.open_volume(&scene, outputs)?;
-        let count = volume.times();
+        let count = volume.sample().encoding().map_or(1, |encoding| encoding.times);
         if let Some(Range { start, end }) = times.clone().filter(|times| times.end > count) {
             let allowed = format!("within 0..{count}, the times of {}", input.name);
             return Err(Failure::Input(format!("--time: found {start}..{end}, allowed: {allowed}")));
