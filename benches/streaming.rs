@@ -1,8 +1,9 @@
-//! Volumes that fit into no memory (SPEC §13): a ball of 2048³ `uint8` voxels in an OME-Zarr store, drawn with `--memory 2GiB`.
+//! Volumes that fit into no memory (SPEC §13): a ball of 2048³ `uint8` voxels in an OME-Zarr store, drawn with `--memory 2GiB`, and the volumes of scene files
+//! in chunks of 32³ voxels.
 //!
-//! `cargo bench --bench streaming -- [SIDE] FOLDER` makes the stores in a folder, unless they are there (for 2048 voxels it takes 4 GB), and draws each
-//! whole process with either classification: seconds, chunks, and peak memory. Beside them stand the seconds that reading the same number of bytes takes, and those of a level that
-//! fits into memory.
+//! `cargo bench --bench streaming -- [SIDE] FOLDER [SCENE…]` makes the stores in a folder, unless they are there (for 2048 voxels it takes 4 GB), and draws each
+//! by a whole process with either classification: seconds, chunks, and peak memory. Beside them stand the seconds that reading the same number of bytes takes,
+//! those of a level that fits into memory, and those of a scene's own volume in memory.
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
 
@@ -14,11 +15,16 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
+use glam::UVec3;
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use sheetsplat::Volume;
+use sheetsplat::volume::{IndexedStore, ReadOptions, Store, StoreIndex, open_store};
 
 /// Voxels along a chunk's sides.
 const CHUNK: usize = 64;
+/// Those of a scene's volume.
+const CHUNK_OF_SCENE: usize = 32;
 const LEVELS: usize = 4;
 
 /// The ball's radius for a volume of side 1, and its ripples: along the radius, so that it is opaque from everywhere, with a surface that is not smooth.
@@ -35,29 +41,86 @@ fn main() {
         println!("{} made in {:.0} s\n", store.display(), start.elapsed().as_secs_f64());
     }
     println!(
-        "| volume | classification | seconds | chunks read | of | of those that the store holds | MB read | peak MiB |"
+        "| volume | classification | seconds | chunks read | of | of those with visible values | MB read | peak MiB |"
     );
     println!("|---|---|---|---|---|---|---|---|");
     for classification in ["before", "after"] {
         for (level, memory) in [(0, "2GiB"), (2, "16GiB")] {
-            let run = draw(&store, level, memory, classification, &folder);
-            let Run { seconds, stats, peak } = run;
-            let of = |key: &str| stats[key].as_u64().map_or("–".to_owned(), |number| number.to_string());
-            let held = count_files(&store.join(level.to_string()));
-            let megabytes = stats["bytes_read"].as_u64().map_or(0, |bytes| bytes / 1_000_000);
-            let dims = side >> level;
-            println!(
-                "| {dims}³, `--memory {memory}` | {classification} | {seconds:.1} | {} | {} | {held} | {megabytes} | {} |",
-                of("chunks_read"),
-                of("chunks_total"),
-                peak >> 20
-            );
-            if stats["chunks_read"].is_u64() && level == 0 {
-                let reading = read(&store.join("0"), stats["chunks_read"].as_u64().unwrap());
+            let name = format!("{}³, `--memory {memory}`", side >> level);
+            let level_of = level.to_string();
+            let run = draw(&store, &["--memory", memory, "--level", &level_of], &ball_sets(), classification, &folder);
+            // Every chunk that the store holds is of the ball.
+            print_row(&name, classification, &run, count_files(&store.join(&level_of)));
+            if level == 0 {
+                let reading = read(&store.join("0"), run.stats["chunks_read"].as_u64().unwrap());
                 println!("| | reading as many chunks alone | {reading:.1} | | | | | |");
             }
         }
     }
+    folders.iter().skip(1).for_each(|scene| draw_scene(scene, &folder));
+}
+
+/// Draws a scene's volume in memory, and streamed from a store with an index.
+fn draw_scene(name: &str, folder: &Path) {
+    let scene = common::open(name);
+    let volume = scene.load_volume().unwrap();
+    let label = common::label(name);
+    let store = folder.join(format!("{label}.zarr"));
+    if !store.exists() {
+        make_plain(&store, &volume);
+    }
+    let index = folder.join(format!("{label}.index"));
+    let mut process = Command::new(env!("CARGO_BIN_EXE_sheetsplat"));
+    assert!(process.arg("index").arg(&store).arg("-o").arg(&index).status().unwrap().success());
+    let indexed = {
+        let store = open_store(&store, &ReadOptions::default()).unwrap();
+        let text = fs::read_to_string(&index).unwrap();
+        IndexedStore::new(store, StoreIndex::decode("index", &text).unwrap(), "index").unwrap()
+    };
+    let opacity = scene.transfer.opacity.clone().unwrap();
+    let across = indexed.levels()[0].chunks();
+    let is_visible = |at: &u32| {
+        let chunk = UVec3::new(at % across.x, at / across.x % across.y, at / (across.x * across.y));
+        let [min, max] = indexed.chunk_range(0, chunk).unwrap().map(f64::from);
+        (0..=256).any(|step| opacity.at(min + (max - min) * f64::from(step) / 256.0) > 0.0)
+    };
+    let visible = (0..across.element_product()).filter(is_visible).count();
+    // Three quarters of the values.
+    let memory = format!("{}B", size_of_val(volume.values()) / 4 * 3);
+    let path = format!("volume.path={:?}", store.canonicalize().unwrap().display().to_string());
+    let sets = ["splatting.compositing=exponential".to_owned(), "camera.fit=volume".to_owned()];
+    let streamed = [sets.as_slice(), &[path]].concat();
+    for classification in ["before", "after"] {
+        let whole = draw(Path::new(name), &[], &sets, classification, folder);
+        print_row(&format!("{label} in memory"), classification, &whole, visible);
+        let index = index.display().to_string();
+        let arguments = ["--memory", &memory, "--index", &index];
+        let run = draw(Path::new(name), &arguments, &streamed, classification, folder);
+        print_row(&format!("{label} in chunks of {CHUNK_OF_SCENE}³"), classification, &run, visible);
+    }
+}
+
+fn print_row(name: &str, classification: &str, run: &Run, visible: usize) {
+    let Run { seconds, stats, peak } = run;
+    let of = |key: &str| stats[key].as_u64().map_or("–".to_owned(), |number| number.to_string());
+    let megabytes = stats["bytes_read"].as_u64().map_or(0, |bytes| bytes / 1_000_000);
+    let [read, total] = ["chunks_read", "chunks_total"].map(of);
+    println!(
+        "| {name} | {classification} | {seconds:.1} | {read} | {total} | {visible} | {megabytes} | {} |",
+        peak >> 20
+    );
+}
+
+/// How the ball is drawn.
+fn ball_sets() -> Vec<String> {
+    [
+        "image={width=1024,height=1024}",
+        "camera={direction=[1,0.4,-0.3],fit=\"volume\"}",
+        "transfer={color=[[0,[0.2,0.1,0]],[255,[1,0.9,0.8]]],opacity=[[60,0],[100,1]]}",
+        "splatting.compositing=exponential",
+    ]
+    .map(str::to_owned)
+    .to_vec()
 }
 
 /// A process that drew.
@@ -68,17 +131,17 @@ struct Run {
     peak: u64,
 }
 
-/// Draws a level by the program.
-fn draw(store: &Path, level: usize, memory: &str, classification: &str, folder: &Path) -> Run {
-    let (image, stats) = (folder.join(format!("{classification}-{level}.png")), folder.join("stats.json"));
+/// Draws an input by the program.
+fn draw(input: &Path, arguments: &[&str], sets: &[String], classification: &str, folder: &Path) -> Run {
+    let (image, stats) = (folder.join(format!("{classification}.png")), folder.join("stats.json"));
     let start = Instant::now();
+    let sets = sets.iter().flat_map(|set| ["--set", set]);
     let mut process = Command::new(env!("CARGO_BIN_EXE_sheetsplat"))
         .arg("render")
-        .arg(store)
-        .args(["--backend", "cpu", "--memory", memory, "--level", &level.to_string()])
-        .args(["--set", "image={width=1024,height=1024}", "--set", "camera={direction=[1,0.4,-0.3],fit=\"volume\"}"])
-        .args(["--set", "transfer={color=[[0,[0.2,0.1,0]],[255,[1,0.9,0.8]]],opacity=[[60,0],[100,1]]}"])
-        .args(["--set", "splatting.compositing=exponential"])
+        .arg(input)
+        .args(["--backend", "cpu"])
+        .args(arguments)
+        .args(sets)
         .args(["--set", &format!("splatting.classification={classification}")])
         .arg("-o")
         .arg(image)
@@ -149,20 +212,18 @@ fn make_store(store: &Path, side: usize) {
 
 fn make_level(folder: &Path, side: usize) {
     fs::create_dir_all(folder).unwrap();
-    let array = json!({
-        "zarr_format": 3, "node_type": "array", "shape": [side, side, side], "data_type": "uint8", "fill_value": 0,
-        "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": [CHUNK, CHUNK, CHUNK] } },
-        "chunk_key_encoding": { "name": "default", "configuration": { "separator": "/" } },
-        "codecs": [{ "name": "bytes" }], "dimension_names": ["z", "y", "x"],
-    });
+    let array = metadata([side; 3], "uint8", CHUNK, &json!({}));
     fs::write(folder.join("zarr.json"), array.to_string()).unwrap();
     let across = side.div_ceil(CHUNK);
+    let places: Vec<f64> = (0..side).map(|index| (index as f64 + 0.5) / side as f64 - 0.5).collect();
+    // The place and the ripple's factor of every voxel along an axis.
+    let waves: Vec<(f64, f64)> = places.into_iter().map(|at| (at, (at * RIPPLES).sin())).collect();
     (0..across * across).into_par_iter().for_each(|at| {
         let (z, y) = (at / across, at % across);
         for x in 0..across {
             let value = |at: usize| {
                 let voxel = [x * CHUNK + at % CHUNK, y * CHUNK + at / CHUNK % CHUNK, z * CHUNK + at / (CHUNK * CHUNK)];
-                ball(voxel.map(|index| (index as f64 + 0.5) / side as f64 - 0.5))
+                ball(voxel.map(|index| waves[index]))
             };
             let values: Vec<u8> = (0..CHUNK * CHUNK * CHUNK).map(value).collect();
             if values.iter().any(|&value| value > 0) {
@@ -174,9 +235,47 @@ fn make_level(folder: &Path, side: usize) {
     });
 }
 
-/// The value at a place of a volume of side 1 around 0.
-fn ball([x, y, z]: [f64; 3]) -> u8 {
+/// Writes the values of a volume as an OME-Zarr store of one level.
+fn make_plain(store: &Path, volume: &Volume) {
+    let [nx, ny, nz] = volume.dims().to_array().map(|n| n as usize);
+    let [x, y, z] = volume.spacing().to_array();
+    let axes = ["z", "y", "x"].map(|name| json!({ "name": name, "type": "space" }));
+    let transformations = json!([{ "type": "scale", "scale": [z, y, x] }]);
+    let datasets = json!([{ "path": "0", "coordinateTransformations": transformations }]);
+    let ome = json!({ "version": "0.5", "multiscales": [{ "axes": axes, "datasets": datasets }] });
+    let group = json!({ "zarr_format": 3, "node_type": "group", "attributes": { "ome": ome } });
+    let array = metadata([nz, ny, nx], "float32", CHUNK_OF_SCENE, &json!({ "endian": "little" }));
+    let chunks = [nx, ny, nz].map(|n| n.div_ceil(CHUNK_OF_SCENE));
+    fs::create_dir_all(store.join("0")).unwrap();
+    fs::write(store.join("zarr.json"), group.to_string()).unwrap();
+    fs::write(store.join("0/zarr.json"), array.to_string()).unwrap();
+    for at in 0..chunks.iter().product() {
+        let [i, j, k] = [at % chunks[0], at / chunks[0] % chunks[1], at / (chunks[0] * chunks[1])];
+        let values = (0..CHUNK_OF_SCENE.pow(3)).map(|at| {
+            let side = CHUNK_OF_SCENE;
+            let [x, y, z] = [i * side + at % side, j * side + at / side % side, k * side + at / (side * side)];
+            // Chunks at the end are whole in the file.
+            if x < nx && y < ny && z < nz { volume.values()[x + nx * (y + ny * z)] } else { 0.0 }
+        });
+        let row = store.join(format!("0/c/{k}/{j}"));
+        fs::create_dir_all(&row).unwrap();
+        fs::write(row.join(i.to_string()), values.flat_map(f32::to_le_bytes).collect::<Vec<u8>>()).unwrap();
+    }
+}
+
+/// The metadata of an array of uncompressed chunks.
+fn metadata(shape: [usize; 3], data_type: &str, chunk: usize, bytes: &Value) -> Value {
+    json!({
+        "zarr_format": 3, "node_type": "array", "shape": shape, "data_type": data_type, "fill_value": 0,
+        "chunk_grid": { "name": "regular", "configuration": { "chunk_shape": [chunk, chunk, chunk] } },
+        "chunk_key_encoding": { "name": "default", "configuration": { "separator": "/" } },
+        "codecs": [{ "name": "bytes", "configuration": bytes }], "dimension_names": ["z", "y", "x"],
+    })
+}
+
+/// The value at a place of a volume of side 1 around 0, given with the ripple's factors.
+fn ball([(x, a), (y, b), (z, c)]: [(f64, f64); 3]) -> u8 {
     let radius = (x * x + y * y + z * z).sqrt();
-    let ripple = (x * RIPPLES).sin() * (y * RIPPLES).sin() * (z * RIPPLES).sin();
+    let ripple = a * b * c;
     if radius < RADIUS * (1.0 + 0.03 * ripple) { (160.0 + 80.0 * ripple) as u8 } else { 0 }
 }

@@ -58,7 +58,8 @@ def test_bytes_are_those_of_a_volume_in_memory(ball: pathlib.Path) -> None:
         assert np.asarray(pictures[0])[..., 3].max() > 0.9
     stats = pictures[1].stats
     assert 0 < stats["chunks_read"] < stats["chunks_total"] == (SIDE // CHUNK) ** 3
-    parts = [[view.part(**piece) for piece in view.split(6)] for view in (whole, streamed)]
+    pieces = streamed.split(6)
+    parts = [[view.part(**piece) for piece in pieces] for view in (whole, streamed)]
     np.testing.assert_array_equal(*[sheetsplat.merge(each) for each in parts])
     turns = [list(view.orbit(count=3)) for view in (whole, streamed)]
     for pictures in zip(*turns, strict=True):
@@ -71,8 +72,8 @@ def test_what_needs_all_values_is_refused(ball: pathlib.Path) -> None:
     for attempt in (lambda: volume.values, lambda: Volume(volume, spacing=2)):
         with pytest.raises(VolumeError, match="found a volume that is streamed"):
             attempt()
-    with pytest.raises(SceneError, match="volume: found a volume that is streamed, with the reference backend"):
-        View(volume, backend="reference")
+    with pytest.raises(SceneError, match="splatting.compositing: found \"average\" for a volume that is streamed"):
+        View(volume, backend="reference", splatting={"compositing": "average"})
     with pytest.raises(SceneError, match=r"memory: found \"2XB\", allowed: a number of bytes"):
         Volume(ball, memory="2XB")
     assert not Volume(ball, memory=1 << 23).streamed

@@ -50,7 +50,10 @@ impl Chunk {
                 source.note(number, &values);
                 (Some(Volume::piece(Grid { dims, ..source.grid }, values)), read)
             }
-            false => (None, 0),
+            false => {
+                source.note_fill(number);
+                (None, 0)
+            }
         };
         let (mut bricks, mut placed, mut overlaps) = (Vec::new(), Vec::new(), Overlaps::default());
         let mut new = Drawn::default();

@@ -61,9 +61,9 @@ impl Stream {
         self.chunks_in(within).try_fold(EMPTY, |all, number| Some(union(all, self.source.known_range(number)?)))
     }
 
-    /// Whether nothing is known of a chunk's values but that the store holds them.
+    /// Whether nothing is known of a chunk's values.
     pub(super) fn is_unread(&self, number: u32) -> bool {
-        self.source.range(number).is_none()
+        self.source.known_range(number).is_none()
     }
 
     /// The chunks that share voxels with a box.

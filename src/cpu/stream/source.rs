@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::UVec3;
 
-use super::ranges::{Known, Ranges};
+use super::ranges::Ranges;
 use crate::cpu::bin::{Placed, place_box};
 use crate::cpu::project::Projection;
 use crate::error::setting::SettingError;
@@ -135,34 +135,25 @@ impl Source {
         (first.z..=last.z).flat_map(move |z| (first.y..=last.y).flat_map(move |y| columns(y, z)))
     }
 
-    /// The minimum and maximum of a chunk's values, if the store knows them, or they have been read.
+    /// The minimum and maximum of a chunk's values, if the store knows them, or they have been read, or it turned out that the store does not hold them.
     pub(super) fn known_range(&self, number: u32) -> Option<[f32; 2]> {
-        if let Known::Range(range) = self.ranges.of(number) {
+        if let Some(range) = self.ranges.of(number) {
             return Some(range);
         }
         let of = |chunk| self.store.chunk_range(self.level, chunk);
         let range = self.stored(self.bounds(number)).map(of).reduce(|a, b| Some(union(a?, b?))).flatten();
-        range.inspect(|&range| self.ranges.set(number, Known::Range(range)))
-    }
-
-    /// As [`Self::known_range`], and of a chunk that the store does not hold.
-    pub(super) fn range(&self, number: u32) -> Option<[f32; 2]> {
-        let known = self.known_range(number);
-        if known.is_some() || self.ranges.of(number) == Known::Held {
-            return known;
-        }
-        // Reading a chunk tells why a store cannot be read.
-        let is_held = self.is_stored(number).unwrap_or(true);
-        let fill = self.store.fill();
-        let of_fill = if fill.is_finite() { [fill; 2] } else { EMPTY };
-        self.ranges.set(number, if is_held { Known::Held } else { Known::Range(of_fill) });
-        (!is_held).then_some(of_fill)
+        range.inspect(|&range| self.ranges.set(number, range))
     }
 
     /// Notes the values of a chunk that has been read, with those around it.
     pub(super) fn note(&self, number: u32, values: &[f32]) {
-        let range = values.iter().fold(EMPTY, |range, &value| union(range, [value; 2]));
-        self.ranges.set(number, Known::Range(range));
+        self.ranges.set(number, values.iter().fold(EMPTY, |range, &value| union(range, [value; 2])));
+    }
+
+    /// Notes that the store holds none of a chunk's values.
+    pub(super) fn note_fill(&self, number: u32) {
+        let fill = self.store.fill();
+        self.ranges.set(number, if fill.is_finite() { [fill; 2] } else { EMPTY });
     }
 
     /// Whether the store holds any voxel of a chunk.
