@@ -80,7 +80,7 @@ fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
 // Loads the values and differences of the voxels of the queue from `first` on.
 fn shade_voxels(first: u32) {
     for (var i = first; i < queue_count; i += lanes) {
-        passes += PASSES_PER_SHADING;
+        passes += PASSES_PER_LOAD;
         let is_in = i + lane < queue_count;
         let slot = queue_first + min(i + lane, queue_count - 1u);
         let voxel = queue_points[slot].w;
@@ -156,6 +156,9 @@ fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Prog
     let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
     (*progress).open = with_blocks((*progress).open, pixels.thread, open_word(pixels, opacity, far));
 }
+
+// Passes to load the values of one voxel per lane.
+const PASSES_PER_LOAD = 2u;
 
 // Passes to classify, shade and composite four slabs at four pixels.
 const PASSES_PER_SLABS = 80u;

@@ -107,6 +107,7 @@ def test_workers_read_their_own_chunks(ball: pathlib.Path) -> None:
     import sheetsplat.dask
 
     view = View(ball, memory=MEMORY, **LOOK)
+    view.scene = view.scene.explicit(view.volume)
     expected = sheetsplat.merge(view.part(**piece) for piece in view.split(5))
     with (
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,

@@ -43,6 +43,9 @@ const MAX_PASSES_OF_BLOCK: u32 = 40;
 /// 8 to keep them, and 10 where the queue is full.
 const MAX_PASSES_OF_BRICK: u32 = 158;
 
+/// The same where values are gathered (SPEC §9): loading them takes 16 instead of shading's 56.
+const MAX_PASSES_OF_BRICK_OF_VALUES: u32 = MAX_PASSES_OF_BRICK - 40;
+
 /// The number of passes that add a brick's voxels to a block.
 const MAX_PASSES_OF_ADDITION: u32 = 56;
 
@@ -67,10 +70,14 @@ pub struct Passes {
 
 impl Passes {
     /// The passes of a view in which a workgroup draws `blocks` blocks of a patch with subgroups of `threads` threads or more, and looking up a
-    /// voxel's control points in memory takes at most `search` passes.
-    pub fn new(search: u32, blocks: u32, threads: u32) -> Self {
+    /// voxel's control points in memory takes at most `search` passes; where `values` are gathered nothing is looked up.
+    pub fn new(search: u32, blocks: u32, threads: u32, values: bool) -> Self {
         let per_group = MAX_PASSES_OF_GROUP + blocks * (MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
-        let per_brick = MAX_PASSES_OF_BRICK + blocks * MAX_PASSES_OF_ADDITION + SHADED_PER_BRICK * search;
+        let of_voxels = match values {
+            true => MAX_PASSES_OF_BRICK_OF_VALUES,
+            false => MAX_PASSES_OF_BRICK + SHADED_PER_BRICK * search,
+        };
+        let per_brick = of_voxels + blocks * MAX_PASSES_OF_ADDITION;
         // Half as many threads take twice as many passes.
         let times = 8_u32.div_ceil(threads);
         Self { most: MAX_PASSES, per_group: times * per_group, per_brick: times * per_brick, search }
@@ -196,7 +203,7 @@ impl PatchBins {
         let entries: Vec<_> = strips.par_iter().map(|strip| sort.sorted(strip)).collect();
         let entries = entries.concat();
         let of_workgroups = |workgroups| {
-            let passes = Passes::new(search, BLOCKS / workgroups, threads);
+            let passes = Passes::new(search, BLOCKS / workgroups, threads, planes.is_some());
             let dispatches = dispatches(&starts, groups as usize, &passes, planes.is_some());
             dispatches.map(|dispatches| (workgroups, passes, dispatches))
         };

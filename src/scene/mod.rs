@@ -360,7 +360,7 @@ impl Scene {
         let ImageSettings { width, height, .. } = self.image;
         let camera =
             self.extent(volume, &transfer).map_or(self.camera, |extent| fit(&extent, &self.camera, [width, height]));
-        let camera = camera.explicit(volume.grid(), self.splatting.radius, width, height);
+        let camera = camera.explicit(volume.drawn_grid(), self.splatting.radius, width, height);
         let mut channels = self.explicit_channels(volume).into_iter();
         let Some(Channel { name, transfer, .. }) = channels.next() else { return self.clone() };
         let level = self.level_in(volume);

@@ -136,6 +136,8 @@ pub struct Volume {
     level: u32,
     /// What was read of a store; not part of the volume itself.
     reads: Option<StoreCounts>,
+    /// The grid of the voxels that the values are a sample of, if they are one.
+    sampled: Option<Grid>,
     /// Not part of the volume itself; clones share them, since their values are the same.
     coefficients: KeptCoefficients,
 }
@@ -194,6 +196,7 @@ impl Volume {
             levels: Vec::new(),
             level: 0,
             reads: None,
+            sampled: None,
             coefficients: KeptCoefficients::default(),
         }
     }
@@ -297,6 +300,11 @@ impl Volume {
     /// The grid of the voxels.
     pub fn grid(&self) -> &Grid {
         &self.grid
+    }
+
+    /// The grid of the voxels that are drawn: the volume's own, or that which it is a sample of.
+    pub(crate) fn drawn_grid(&self) -> &Grid {
+        self.sampled.as_ref().unwrap_or(&self.grid)
     }
 
     /// The number of voxels along x, y and z.

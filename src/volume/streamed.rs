@@ -30,7 +30,8 @@ impl StreamedVolume {
             let allowed = format!("0 to {}", levels - 1);
             return Err(super::invalid(origin, "level", level.to_string(), allowed));
         }
-        let sample = Arc::new(sample(origin, &*store, memory / 8)?);
+        let sampled = Some(store.levels()[level].grid);
+        let sample = Arc::new(Volume { sampled, ..sample(origin, &*store, memory / 8)? });
         Ok(Self { store, level, sample, memory: memory / 2 })
     }
 

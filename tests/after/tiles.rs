@@ -117,7 +117,7 @@ fn frames_of_many_dispatches_agree_with_the_f64_evaluation() {
     let gpu = gpu();
     let mut random = Random(22);
     for (slab_width, direction) in [(1.0, DVec3::Z), (1.0, DVec3::new(0.4, 0.9, -0.3)), (0.6, DVec3::X)] {
-        let volume = random_volume(&mut random, (40.0, 45.0), SPACINGS[0]);
+        let volume = random_volume(&mut random, (44.0, 49.0), SPACINGS[0]);
         let (_, mut scene) = random_case(&mut random, false);
         (scene.transfer.iso_ranges, scene.transfer.gradient_opacity) = (None, None);
         scene.clip.planes.clear();
