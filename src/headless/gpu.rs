@@ -20,7 +20,7 @@ use crate::gpu::gpu_volume::GpuVolume;
 use crate::gpu::options::{Blend, RendererOptions};
 use crate::gpu::placement::Placement;
 use crate::image::Image;
-use crate::part::{self, Part};
+use crate::part::{self, Content, Part};
 use crate::pick::Pick;
 use crate::renderer::Renderer;
 use crate::renderer::scene_view::SceneView;
@@ -131,28 +131,38 @@ impl GpuHeadless {
         if view.surfaces.is_some() {
             return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());
         }
+        let (content, stats) = self.draw_content(view, window)?;
+        let of = (&view.volume.volume().clone().into(), &view.scene);
+        let frame = view.frame.as_ref().ok_or_else(no_frame)?;
+        Ok((Part::new(of, &frame.view, window, content)?, stats))
+    }
+
+    /// Draws the pixels of a part, without first hits, and returns them with statistics.
+    ///
+    /// # Errors
+    /// As for [`Self::draw`].
+    pub(super) fn draw_content(&self, view: &mut SceneView, window: &Window) -> Result<(Content, Stats), RenderError> {
         let first_hit = view.first_hit.take();
         view.window = Some(window.clone());
-        let drawn = scoped(&self.device, || self.draw_part_unscoped(view, window));
+        let drawn = scoped(&self.device, || self.draw_content_unscoped(view, window));
         (view.window, view.first_hit) = (None, first_hit);
         drawn?
     }
 
-    fn draw_part_unscoped(&self, view: &mut SceneView, window: &Window) -> Result<(Part, Stats), RenderError> {
+    fn draw_content_unscoped(&self, view: &mut SceneView, window: &Window) -> Result<(Content, Stats), RenderError> {
         let prepare_ms = self.prepare(view)?;
         let start = Instant::now();
         let mut encoder = self.encoder("sheetsplat.part");
         self.renderer.record(&mut encoder, view);
         self.queue.submit([encoder.finish()]);
         let counts = view.counts();
-        let frame = view.frame.as_ref().ok_or_else(|| RenderError::Readback("there is no frame".to_owned()))?;
+        let frame = view.frame.as_ref().ok_or_else(no_frame)?;
         let Splatting { compositing, classification, .. } = view.scene.splatting;
         let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum);
         let chosen = (is_choice && classification == Classification::After).then_some(compositing);
         let content = content::content((&self.device, &self.queue), frame, &window.region, chosen)?;
-        let part = Part::new((&view.volume.volume().clone().into(), &view.scene), &frame.view, window, content)?;
         let stats = self.stats(view, counts, 0, [prepare_ms, milliseconds_since(start)])?;
-        Ok((part, stats))
+        Ok((content, stats))
     }
 
     /// The first hit at a pixel of the last frame drawn, with pixels counted from the upper left; `None` where the ray does not reach the
@@ -262,4 +272,8 @@ pub(super) fn wait(device: &Device) -> Result<(), RenderError> {
         Ok(Err(error)) => Err(RenderError::Readback(error.to_string())),
         Err(_) => Err(DeviceFault::Lost.into()),
     }
+}
+
+fn no_frame() -> RenderError {
+    RenderError::Readback("there is no frame".to_owned())
 }

@@ -32,7 +32,7 @@ use crate::cpu::{CpuRenderer, StreamRenderer};
 use crate::error::RenderError;
 use crate::error::device::DeviceError;
 use crate::error::setting::SettingError;
-use crate::part::Part;
+use crate::part::{Content, Part};
 use crate::pick::Pick;
 pub use crate::rendering::{Backend, Rendering};
 use crate::scene::{OpenVolume, Scene};
@@ -149,7 +149,7 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.draw_part(window),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw_part(window),
-            (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => {
+            (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => {
                 view.draw_part(window, &mut |volume, scene, window| self.draw_box(volume, scene, window))
             }
             (_, other) => Err(self.refuse(other.backend()).into()),
@@ -188,14 +188,23 @@ impl Headless {
         if self.draws_by_cpu() {
             return Ok(HeadlessView::new(ViewBackend::Stream(Box::new(StreamRenderer::new(volume, scene)?)), None));
         }
-        let view = Box::new(BoxedView::new(volume, scene)?);
-        Ok(HeadlessView::new(ViewBackend::Boxed(view, self.backend()), None))
+        let view = BoxedView::new(volume, scene, self.backend())?;
+        Ok(HeadlessView::new(ViewBackend::Boxed(Box::new(view)), None))
     }
 
     /// Draws a window of a box of voxels of a volume that is streamed.
-    fn draw_box(&self, volume: Volume, scene: &Scene, window: &Window) -> Result<(Part, Stats), RenderError> {
-        let mut view = self.view(volume, scene)?;
-        self.draw_part(&mut view, window)
+    fn draw_box(&self, volume: Volume, scene: &Scene, window: &Window) -> Result<(Content, Stats), RenderError> {
+        match &self.drawer {
+            #[cfg(feature = "gpu")]
+            Drawer::Gpu(gpu) => gpu.draw_content(&mut gpu.view(volume, scene)?, window),
+            // It reads chunk by chunk.
+            #[cfg(feature = "cpu")]
+            Drawer::Cpu => Err(self.refuse(Backend::Cpu).into()),
+            Drawer::Reference => {
+                let (content, _, stats) = ReferenceView::new(volume, scene)?.draw_content(window)?;
+                Ok((content, stats))
+            }
+        }
     }
 
     /// Changes a view's scene, whose own volume is ignored. Only what depends on the change is computed again: on the CPU as
@@ -221,7 +230,7 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.set_scene(scene),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.set_scene(scene),
-            (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => view.set_scene(scene),
+            (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => view.set_scene(scene),
             (_, other) => Err(self.refuse(other.backend()).into()),
         }
     }
@@ -240,7 +249,7 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.draw(),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw(),
-            (_, ViewBackend::Boxed(view, backend)) if *backend == self.backend() => {
+            (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => {
                 view.draw(&mut |volume, scene, window| self.draw_box(volume, scene, window))
             }
             (_, other) => Err(self.refuse(other.backend()).into()),
@@ -263,7 +272,7 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(_)) if self.draws_by_cpu() => Err(view::streamed_first_hits().into()),
             (Drawer::Reference, ViewBackend::Reference(view)) => Ok(view.pick(pixel)?),
-            (_, ViewBackend::Boxed(_, backend)) if *backend == self.backend() => {
+            (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => {
                 Err(view::streamed_first_hits().into())
             }
             (_, other) => Err(self.refuse(other.backend()).into()),

@@ -8,7 +8,7 @@ use super::{Backend, Rendering, milliseconds_since};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::part::{self, Part};
+use crate::part::{self, Content, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::reference::{self, Host};
 use crate::scene::{ImageSettings, Scene};
@@ -67,17 +67,22 @@ impl ReferenceView {
     }
 
     /// Draws a part of the image.
-    pub(super) fn draw_part(&mut self, window: &Window) -> Result<(Part, Stats), RenderError> {
+    pub(super) fn draw_part(&self, window: &Window) -> Result<(Part, Stats), RenderError> {
+        part::check(&self.volume, &self.scene, window)?;
+        let (content, view, stats) = self.draw_content(window)?;
+        Ok((Part::new((&self.volume.clone().into(), &self.scene), &view, window, content)?, stats))
+    }
+
+    /// Draws the pixels of a part, and returns them with their view and statistics.
+    pub(super) fn draw_content(&self, window: &Window) -> Result<(Content, ViewGeometry, Stats), RenderError> {
         let start = Instant::now();
         let Self { volume, scene, transfer, .. } = self;
-        part::check(volume, scene, window)?;
         let framed = scene.framed(volume, transfer);
         let ImageSettings { width, height, .. } = scene.image;
         let view = ViewGeometry::new(volume.grid(), &framed.camera, &framed.splatting, [width, height])?;
         let opened = window.opened(&view.slabs_of(volume.grid()));
         let content = reference::part(volume, transfer, scene, &opened)?;
-        let part = Part::new((&volume.clone().into(), scene), &view, window, content)?;
-        Ok((part, self.stats(start)?))
+        Ok((content, view, self.stats(start)?))
     }
 
     pub(super) fn draw(&mut self) -> Result<Rendering, RenderError> {

@@ -32,7 +32,7 @@ pub(super) enum ViewBackend {
     Stream(Box<StreamRenderer>),
     Reference(Box<ReferenceView>),
     /// A volume that is read while another backend draws it, box by box.
-    Boxed(Box<BoxedView>, Backend),
+    Boxed(Box<BoxedView>),
 }
 
 impl ViewBackend {
@@ -43,7 +43,7 @@ impl ViewBackend {
             #[cfg(feature = "cpu")]
             Self::Cpu(_) | Self::Stream(_) => Backend::Cpu,
             Self::Reference(_) => Backend::Reference,
-            Self::Boxed(_, backend) => *backend,
+            Self::Boxed(view) => view.backend(),
         }
     }
 }
@@ -71,7 +71,7 @@ impl HeadlessView {
             #[cfg(feature = "cpu")]
             ViewBackend::Stream(view) => view.scene(),
             ViewBackend::Reference(view) => view.scene(),
-            ViewBackend::Boxed(view, _) => view.scene(),
+            ViewBackend::Boxed(view) => view.scene(),
         }
     }
 
@@ -88,7 +88,7 @@ impl HeadlessView {
             #[cfg(feature = "cpu")]
             ViewBackend::Stream(view) => view.set_camera(camera),
             ViewBackend::Reference(view) => view.set_camera(camera),
-            ViewBackend::Boxed(view, _) => view.set_camera(camera),
+            ViewBackend::Boxed(view) => view.set_camera(camera),
         }
     }
 
@@ -125,10 +125,7 @@ impl HeadlessView {
 
 /// Refuses first hits of a volume that is read while it is drawn.
 fn no_first_hits(opacity: Option<f64>) -> Result<(), SettingError> {
-    match opacity {
-        None => Ok(()),
-        Some(_) => Err(streamed_first_hits()),
-    }
+    opacity.map_or(Ok(()), |_| Err(streamed_first_hits()))
 }
 
 /// The error for first hits of a volume that is read while it is drawn.

@@ -81,8 +81,10 @@ impl Scene {
         if let Some(volume) = streamed(&scene, options.memory_limit(), &access)? {
             return Ok((volume.into(), access.files()));
         }
-        let (volume, files) = scene.load_volume_and_files(options)?;
-        Ok((volume.into(), files))
+        // What the store reserved is free again.
+        let access = Access::new(options)?;
+        let volume = load::channels(&scene, &access)?;
+        Ok((volume.into(), access.files()))
     }
 
     /// Checks that the scene can show a volume that is read while it is drawn, given its sample: one channel of values, with image-aligned sheets, and values that

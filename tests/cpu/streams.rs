@@ -15,8 +15,8 @@ use sheetsplat::volume::{
 };
 use sheetsplat::{Image, RenderError, Scene};
 
-use crate::common::compare::assert_at_least;
-use crate::common::images::psnr;
+use crate::common::compare::{assert_at_least, assert_at_most};
+use crate::common::images::{largest_difference, psnr};
 use crate::common::store::MemoryStore;
 
 /// A store that holds no chunk.
@@ -355,10 +355,8 @@ fn parts_of_streams_are_those_of_the_volume_in_memory() {
                 parts.push(part);
             }
         }
-        let merged = Image::merge(parts).unwrap();
-        let difference = |(a, b): (&[f32; 4], &[f32; 4])| (0..4).map(|at| (a[at] - b[at]).abs()).fold(0.0, f32::max);
-        let largest = merged.pixels.iter().zip(&all.image.pixels).map(difference).fold(0.0, f32::max);
-        assert!(largest <= 1e-6, "{largest}: {classification} {compositing}");
+        let largest = largest_difference(&Image::merge(parts).unwrap(), &all.image);
+        assert_at_most(largest, 1e-6, format!("{classification} {compositing}"));
     }
 }
 

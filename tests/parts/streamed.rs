@@ -10,7 +10,7 @@ use sheetsplat::settings::{Region, Window};
 use sheetsplat::stats::StoreCounts;
 use sheetsplat::volume::{IndexedStore, Store, StoreIndex, StreamedVolume, Volume, builtin};
 
-use crate::common::compare::assert_at_least;
+use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
 use crate::common::store::MemoryStore;
 use crate::merging::headless;
@@ -50,6 +50,8 @@ fn assert_same_with(backend: Backend, size: u32, sets: &[&str], memory: u64) -> 
     let name = format!("{backend} {sets:?}");
     assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, name);
     let counts = drawn.stats.store.unwrap();
+    // Each chunk's bytes count once, however many boxes need it.
+    assert!(counts.bytes_read > 0 && counts.bytes_read <= volume.values().len() as u64, "{sets:?} {counts:?}");
     assert!(counts.chunks_read > 0 && counts.chunk_bytes <= memory / 4, "{sets:?} {counts:?}");
     assert!(counts.chunk_bytes < size_of_val(volume.values()) as u64 / 2, "{sets:?} {counts:?}");
     counts
@@ -100,10 +102,16 @@ fn boxes_that_show_nothing_are_not_read() {
     let headless = headless(Backend::Reference);
     let plain = headless.render_volume(streamed(&volume, store(), 1 << 20), &scene).unwrap();
     let told = headless.render_volume(streamed(&volume, indexed, 1 << 20), &scene).unwrap();
-    assert!(largest_difference(&plain.image, &told.image) < 1e-6);
+    assert_at_most(largest_difference(&plain.image, &told.image), 1e-6, "with an index");
     assert!(plain.image.pixels.iter().any(|pixel| pixel[3] > 0.9));
     let read = [plain, told].map(|drawn| drawn.stats.store.unwrap().chunks_read);
     assert!(read[1] < read[0], "{read:?}");
+    let (_, nothing) = head(8, &["transfer.opacity=[[240,0],[250,1]]"]);
+    let index = StoreIndex::new(&store(), "store", &|| {}).unwrap();
+    let indexed = IndexedStore::new(Arc::new(store()), index, "index").unwrap();
+    let drawn = headless.render_volume(streamed(&volume, indexed, 1 << 20), &nothing).unwrap();
+    assert_eq!((drawn.stats.store.unwrap().chunks_read, drawn.stats.backend.as_str()), (0, "reference"));
+    assert!(drawn.image.pixels.iter().all(|pixel| *pixel == drawn.image.pixels[0]));
 }
 
 #[test]
@@ -120,7 +128,7 @@ fn parts_of_boxes_merge() {
             parts.push(headless.draw_part(&mut view, &window).unwrap().0);
         }
     }
-    assert!(largest_difference(&Image::merge(parts).unwrap(), &whole) < 1e-6);
+    assert_at_most(largest_difference(&Image::merge(parts).unwrap(), &whole), 1e-6, "parts");
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use glam::{DVec2, DVec3, UVec3};
+use rayon::prelude::*;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
@@ -12,11 +13,10 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::iso_range::ValueSet;
 use crate::scene::Scene;
 use crate::settings::splatting::Classification;
-use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::Region;
 use crate::stats::StoreCounts;
 use crate::volume::range::{EMPTY, union};
-use crate::volume::{StoreLevel, StreamedVolume, Volume};
+use crate::volume::{StoreLevel, StreamedVolume, Volume, VolumeError};
 
 /// The maximum number of chunks.
 const MOST_CHUNKS: u64 = 1 << 24;
@@ -49,16 +49,29 @@ pub(super) struct Chunks<'a> {
 
 /// By which values it is told that a chunk shows nothing.
 struct Shown {
-    transfer: TransferFunction,
+    values: ValueSet,
     /// Whether points between voxels have values between theirs.
     is_between: bool,
 }
 
 /// A box of voxels: the first one, and the one behind the last.
 #[derive(Clone, Copy)]
-pub(super) struct Found {
+pub(super) struct VoxelBox {
     low: UVec3,
     end: UVec3,
+}
+
+/// Some slabs, and the box of voxels that they need; `None` if they need none.
+pub(super) type Step = (Range<i32>, Option<VoxelBox>);
+
+/// What was read of a chunk for a box: the first voxel and the voxels along each axis, their values, and the bytes of the store; no bytes if the store does not hold
+/// the chunk.
+struct Piece {
+    chunk: UVec3,
+    low: UVec3,
+    dims: UVec3,
+    values: Vec<f32>,
+    bytes: Option<u64>,
 }
 
 impl<'a> Chunks<'a> {
@@ -79,24 +92,37 @@ impl<'a> Chunks<'a> {
         let shown = reach
             .cmple(level.chunk)
             .all()
-            .then(|| Shown { transfer: scene.resolve(&volume.sample), is_between: is_after });
+            .then(|| ValueSet::of_tables(&scene.resolve(&volume.sample).tables(None)))
+            .map(|values| Shown { values, is_between: is_after });
         let half_box = geometry.widest_half_box(view);
         let (read, bytes_read, most_held) = (HashSet::new(), 0, 0);
         Ok(Self { volume, level, view: *view, half_box, shown, read, bytes_read, most_held })
     }
 
-    /// The most slabs from the first of some on whose voxels behind a region fit into memory, and their box, if there is one; `None` if those of a single slab do not
-    /// fit.
-    pub(super) fn deepest(&self, region: &Region, slabs: Range<i32>) -> Option<(Range<i32>, Option<Found>)> {
+    /// The steps in which the slabs behind a region are drawn, front to back, each of as many slabs as fit into memory with the voxels that they need; `None` if
+    /// those of some slab do not fit.
+    pub(super) fn steps(&self, region: &Region, slabs: &Range<i32>) -> Option<Vec<Step>> {
+        let mut steps = Vec::new();
+        let mut start = slabs.start;
+        while start < slabs.end {
+            let step = self.deepest(region, start..slabs.end)?;
+            start = step.0.end;
+            steps.push(step);
+        }
+        Some(steps)
+    }
+
+    /// The first step of those of some slabs.
+    fn deepest(&self, region: &Region, slabs: Range<i32>) -> Option<Step> {
         let mut best = None;
         let mut depth = 1;
         loop {
             let end = slabs.end.min(slabs.start.saturating_add(depth));
-            let found = self.found(region, &(slabs.start..end));
-            if found.as_ref().map_or(0, Found::bytes) > self.budget() {
+            let needed = self.needed(region, &(slabs.start..end));
+            if needed.map_or(0, |needed| needed.bytes()) > self.budget() {
                 return best;
             }
-            best = Some((slabs.start..end, found));
+            best = Some((slabs.start..end, needed));
             if end == slabs.end {
                 return best;
             }
@@ -104,8 +130,8 @@ impl<'a> Chunks<'a> {
         }
     }
 
-    /// The box of the voxels that bear on a window; `None` if there are none.
-    fn found(&self, region: &Region, slabs: &Range<i32>) -> Option<Found> {
+    /// The smallest box with all voxels that can change a pixel of a region in some slabs; `None` if no voxel can.
+    fn needed(&self, region: &Region, slabs: &Range<i32>) -> Option<VoxelBox> {
         let view = &self.view;
         let first = DVec2::new(f64::from(region.x), f64::from(region.y)) - PIXELS;
         let last = first + DVec2::new(f64::from(region.width), f64::from(region.height)) + 2.0 * PIXELS;
@@ -122,43 +148,54 @@ impl<'a> Chunks<'a> {
         let dims = self.level.grid.dims.as_dvec3();
         let low = (low - self.half_box - RIM).floor().max(DVec3::ZERO);
         let end = (high + self.half_box + RIM).ceil().min(dims);
-        low.cmplt(end).all().then(|| Found { low: low.as_uvec3(), end: end.as_uvec3() })
+        low.cmplt(end).all().then(|| VoxelBox { low: low.as_uvec3(), end: end.as_uvec3() })
     }
 
     /// Reads the values of a box; `None` if nothing of it can be seen.
     ///
     /// # Errors
     /// If the store cannot be read.
-    pub(super) fn read(&mut self, Found { low, end }: Found) -> Result<Option<Volume>, RenderError> {
-        let StreamedVolume { store, level, .. } = self.volume;
-        let chunks = || between(low / self.level.chunk, (end - 1) / self.level.chunk);
+    pub(super) fn read(&mut self, VoxelBox { low, end }: VoxelBox) -> Result<Option<Volume>, RenderError> {
+        let chunks: Vec<UVec3> = between(low / self.level.chunk, (end - 1) / self.level.chunk).collect();
         let mut is_visible = false;
-        for chunk in chunks() {
+        for &chunk in &chunks {
             is_visible = is_visible || self.is_visible(chunk)?;
         }
         if !is_visible {
             return Ok(None);
         }
-        let dims = end - low;
-        let mut values = vec![0.0; dims.element_product() as usize];
+        let grid = self.level.grid.part(low, end - low);
+        let pieces = chunks.into_par_iter().map(|chunk| self.piece(chunk, VoxelBox { low, end }));
+        let pieces = pieces.collect::<Result<Vec<_>, _>>()?;
+        let mut values = vec![f32::NAN; grid.dims.element_product() as usize];
         self.most_held = self.most_held.max(size_of_val(values.as_slice()) as u64);
-        let bytes = store.read(*level, low, dims, &mut values)?;
-        values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f32::NAN);
-        let mut is_new = false;
-        for chunk in chunks() {
-            if !self.read.contains(&chunk) && store.contains(*level, chunk)? {
-                is_new |= self.read.insert(chunk);
+        for Piece { chunk, low: from, dims, values: own, bytes } in pieces {
+            for (row, number) in own.chunks_exact(dims.x as usize).zip(0..) {
+                let first = from - low + UVec3::new(0, number % dims.y, number / dims.y);
+                values[grid.index_of(first) as usize..][..row.len()].copy_from_slice(row);
+            }
+            if let Some(bytes) = bytes.filter(|_| self.read.insert(chunk)) {
+                self.bytes_read += bytes;
             }
         }
-        if is_new {
-            self.bytes_read += bytes;
-        }
-        Ok(Some(Volume::piece(self.level.grid.part(low, dims), values)))
+        values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f32::NAN);
+        Ok(Some(Volume::piece(grid, values)))
+    }
+
+    /// Reads the part of a chunk that lies in a box.
+    fn piece(&self, chunk: UVec3, within: VoxelBox) -> Result<Piece, VolumeError> {
+        let (StreamedVolume { store, level, .. }, side) = (self.volume, self.level.chunk);
+        let low = within.low.max(chunk * side);
+        let dims = within.end.min((chunk + 1) * side) - low;
+        let mut values = vec![store.fill(); dims.element_product() as usize];
+        let is_held = store.contains(*level, chunk)?;
+        let bytes = is_held.then(|| store.read(*level, low, dims, &mut values)).transpose()?;
+        Ok(Piece { chunk, low, dims, values, bytes })
     }
 
     /// Whether anything of a chunk can be seen.
     fn is_visible(&self, chunk: UVec3) -> Result<bool, RenderError> {
-        let Some(Shown { transfer, is_between }) = &self.shown else { return Ok(true) };
+        let Some(Shown { values, is_between }) = &self.shown else { return Ok(true) };
         let StreamedVolume { store, level, .. } = self.volume;
         let last = self.level.chunks() - 1;
         let around = if *is_between { 1 } else { 0 };
@@ -172,7 +209,7 @@ impl<'a> Chunks<'a> {
             }
         }
         let [min, max] = range;
-        Ok(min <= max && ValueSet::of_tables(&transfer.tables(None)).meets(min, max))
+        Ok(min <= max && values.meets(min, max))
     }
 
     /// The error for a view whose boxes do not fit.
@@ -197,7 +234,7 @@ impl<'a> Chunks<'a> {
     }
 }
 
-impl Found {
+impl VoxelBox {
     /// The bytes of the box's values.
     fn bytes(&self) -> u64 {
         let dims = self.end - self.low;

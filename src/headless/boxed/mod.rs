@@ -13,7 +13,7 @@ use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::part::{self, Content, Identity, MergeError, Part};
-use crate::rendering::Rendering;
+use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
 use crate::scene::names::{COMPOSITINGS, name_of};
 use crate::settings::camera::Camera;
@@ -23,28 +23,34 @@ use crate::stats::{Counts, Stats, StoreCounts};
 use crate::volume::{StreamedVolume, Volume};
 use chunks::Chunks;
 
-/// The side of a region in pixels, but where voxels of so many pixels do not fit into memory.
+/// The side in pixels of the regions that an image is divided into. A region whose voxels do not fit into memory is divided further.
 const SIDE: u32 = 256;
 
-/// The least side of a region.
+/// The minimum side of a region.
 const LEAST_SIDE: u32 = 8;
 
 /// Draws a window of a scene of a volume in memory.
-pub(super) type DrawPart<'a> = dyn FnMut(Volume, &Scene, &Window) -> Result<(Part, Stats), RenderError> + 'a;
+pub(super) type DrawBox<'a> = dyn FnMut(Volume, &Scene, &Window) -> Result<(Content, Stats), RenderError> + 'a;
 
 /// A view of a volume that is read while it is drawn.
 #[derive(Clone, Debug)]
 pub(super) struct BoxedView {
     volume: StreamedVolume,
     scene: Scene,
+    /// What draws the boxes.
+    backend: Backend,
 }
 
 impl BoxedView {
     /// # Errors
     /// If a setting of the scene is invalid, or not supported for a volume that is streamed.
-    pub(super) fn new(volume: StreamedVolume, scene: &Scene) -> Result<Self, RenderError> {
-        let scene = settled(&volume, scene)?;
-        Ok(Self { volume, scene })
+    pub(super) fn new(volume: StreamedVolume, scene: &Scene, backend: Backend) -> Result<Self, RenderError> {
+        check(&volume, scene)?;
+        Ok(Self { volume, scene: scene.clone(), backend })
+    }
+
+    pub(super) fn backend(&self) -> Backend {
+        self.backend
     }
 
     pub(super) fn scene(&self) -> &Scene {
@@ -52,7 +58,8 @@ impl BoxedView {
     }
 
     pub(super) fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        self.scene = settled(&self.volume, scene)?;
+        check(&self.volume, scene)?;
+        self.scene = scene.clone();
         Ok(())
     }
 
@@ -63,7 +70,7 @@ impl BoxedView {
     }
 
     /// Draws a frame.
-    pub(super) fn draw(&self, draw: &mut DrawPart<'_>) -> Result<Rendering, RenderError> {
+    pub(super) fn draw(&self, draw: &mut DrawBox<'_>) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         let size = [self.scene.image.width, self.scene.image.height];
         let (parts, stats) = self.parts(&Window::whole(size), draw)?;
@@ -72,7 +79,7 @@ impl BoxedView {
     }
 
     /// Draws a part of the image.
-    pub(super) fn draw_part(&self, window: &Window, draw: &mut DrawPart<'_>) -> Result<(Part, Stats), RenderError> {
+    pub(super) fn draw_part(&self, window: &Window, draw: &mut DrawBox<'_>) -> Result<(Part, Stats), RenderError> {
         let start = Instant::now();
         let (parts, stats) = self.parts(window, draw)?;
         let part = side_by_side(parts, window);
@@ -80,8 +87,8 @@ impl BoxedView {
     }
 
     /// The parts of a window, one for each region.
-    fn parts(&self, window: &Window, draw: &mut DrawPart<'_>) -> Result<(Vec<Part>, Stats), RenderError> {
-        let Self { volume, scene } = self;
+    fn parts(&self, window: &Window, draw: &mut DrawBox<'_>) -> Result<(Vec<Part>, Stats), RenderError> {
+        let Self { volume, scene, backend } = self;
         part::check(&volume.sample, scene, window)?;
         let scene = scene.explicit(&volume.sample);
         let view =
@@ -106,8 +113,10 @@ impl BoxedView {
             ..chunks.counts()
         };
         let counts = Counts { voxels_total: volume.grid().voxels(), ..stats.counts };
-        let (width, height) = (view.size[0], view.size[1]);
-        Ok((parts, Stats { store: Some(store), counts, width, height, ..stats }))
+        let [width, height] = view.size;
+        // Nothing may have been drawn.
+        let backend = backend.name().to_owned();
+        Ok((parts, Stats { store: Some(store), counts, width, height, backend, ..stats }))
     }
 }
 
@@ -118,7 +127,7 @@ struct Walk<'a, 'b> {
     /// The slabs that are drawn.
     slabs: Range<i32>,
     chunks: Chunks<'a>,
-    draw: &'a mut DrawPart<'b>,
+    draw: &'a mut DrawBox<'b>,
     parts: Vec<Part>,
     stats: Stats,
 }
@@ -126,48 +135,45 @@ struct Walk<'a, 'b> {
 impl Walk<'_, '_> {
     /// Draws a region, or where the voxels behind it fit into no memory, its quarters.
     fn region(&mut self, region: Region) -> Result<(), RenderError> {
-        let mut drawn: Option<Part> = None;
-        let mut slab = self.slabs.start;
-        while slab < self.slabs.end && !drawn.as_ref().is_some_and(|part| self.is_opaque(&part.content)) {
-            let Some((slabs, found)) = self.chunks.deepest(&region, slab..self.slabs.end) else {
-                let side = region.width.max(region.height).div_ceil(2);
-                if side < LEAST_SIDE {
-                    return Err(self.chunks.too_large().into());
-                }
-                return tiles(&region, side).into_iter().try_for_each(|region| self.region(region));
-            };
-            slab = slabs.end;
+        let Some(steps) = self.chunks.steps(&region, &self.slabs) else {
+            let side = region.width.max(region.height).div_ceil(2);
+            if side < LEAST_SIDE {
+                return Err(self.chunks.too_large().into());
+            }
+            return tiles(&region, side).into_iter().try_for_each(|region| self.region(region));
+        };
+        let mut drawn = self.empty(&Window { slabs: self.slabs.start..self.slabs.start, region });
+        for (slabs, needed) in steps {
+            if self.is_opaque(&drawn.content) {
+                break;
+            }
             let window = Window { slabs, region };
-            let next = match found.map_or(Ok(None), |found| self.chunks.read(found))? {
+            let next = match needed.map_or(Ok(None), |needed| self.chunks.read(needed))? {
                 Some(volume) => self.part(volume, &window)?,
                 None => self.empty(&window),
             };
-            drawn = Some(match drawn {
-                Some(front) => Part::join([front, next]).map_err(unmerged)?,
-                None => next,
-            });
+            drawn = Part::join([drawn, next]).map_err(unmerged)?;
         }
-        let mut part = drawn.unwrap_or_else(|| self.empty(&Window { slabs: self.slabs.clone(), region }));
         // What opaque pixels hide counts as drawn.
-        part.window.slabs.end = part.window.slabs.end.max(self.slabs.end);
-        self.parts.push(part);
+        drawn.window.slabs = self.slabs.clone();
+        self.parts.push(drawn);
         Ok(())
     }
 
-    /// Draws a window from the voxels that bear on it.
+    /// Draws a window from the voxels that it needs.
     fn part(&mut self, volume: Volume, window: &Window) -> Result<Part, RenderError> {
-        let (part, stats) = (self.draw)(volume, &self.scene, window)?;
+        let (content, stats) = (self.draw)(volume, &self.scene, window)?;
         let (counts, prepare_ms) = (self.stats.counts, self.stats.prepare_ms);
         self.stats = Stats { prepare_ms: prepare_ms + stats.prepare_ms, ..stats };
         let own = std::mem::replace(&mut self.stats.counts, counts);
         self.stats.counts.add_channel(&own);
-        Ok(Part { identity: self.identity.clone(), ..part })
+        Ok(Part::named(self.identity.clone(), window.clone(), content))
     }
 
     /// A window that shows nothing.
     fn empty(&self, window: &Window) -> Part {
         let content = Content { colors: vec![[0.0; 4]; window.region.pixels()], extremes: Vec::new() };
-        Part { name: String::new(), identity: self.identity.clone(), window: window.clone(), content }
+        Part::named(self.identity.clone(), window.clone(), content)
     }
 
     /// Whether nothing behind what is drawn can be seen.
@@ -184,8 +190,8 @@ impl Walk<'_, '_> {
     }
 }
 
-/// The scene for a volume's sample, once its classification is known.
-fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<Scene, RenderError> {
+/// Checks that a scene can be drawn box by box.
+fn check(volume: &StreamedVolume, scene: &Scene) -> Result<(), RenderError> {
     scene.check()?;
     scene.check_volume(&volume.sample)?;
     scene.check_streamed(&volume.sample)?;
@@ -203,7 +209,7 @@ fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<Scene, RenderError>
         let found = format!("{found} for a volume that is streamed by this backend");
         return Err(SettingError::new("splatting.compositing", found, "another one, or the cpu backend").into());
     }
-    Ok(scene.clone())
+    Ok(())
 }
 
 /// The squares of some side, or what is left of them, that cover a region.
