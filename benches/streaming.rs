@@ -1,5 +1,5 @@
 //! Volumes that fit into no memory (SPEC §13): a ball of 2048³ `uint8` voxels in an OME-Zarr store, drawn with `--memory 2GiB`, and the volumes of scene files
-//! in chunks of 32³ voxels.
+//! in chunks of 32³ and of 16³ voxels.
 //!
 //! `cargo bench --bench streaming -- [SIDE] FOLDER [SCENE…]` makes the stores in a folder, unless they are there (for 2048 voxels it takes 4 GB), and draws each
 //! by a whole process with either classification: seconds, chunks, and peak memory. Beside them stand the seconds that reading the same number of bytes takes,
@@ -23,8 +23,8 @@ use sheetsplat::volume::{IndexedStore, ReadOptions, Store, StoreIndex, open_stor
 
 /// Voxels along a chunk's sides.
 const CHUNK: usize = 64;
-/// Those of a scene's volume.
-const CHUNK_OF_SCENE: usize = 32;
+/// Those of a scene's volume, which is drawn in chunks of either size.
+const CHUNKS_OF_SCENE: [usize; 2] = [32, 16];
 const LEVELS: usize = 4;
 
 /// The ball's radius for a volume of side 1, and its ripples: along the radius, so that it is opaque from everywhere, with a surface that is not smooth.
@@ -57,19 +57,21 @@ fn main() {
             }
         }
     }
-    folders.iter().skip(1).for_each(|scene| draw_scene(scene, &folder));
+    for scene in folders.iter().skip(1) {
+        CHUNKS_OF_SCENE.into_iter().for_each(|chunk| draw_scene(scene, chunk, &folder));
+    }
 }
 
 /// Draws a scene's volume in memory, and streamed from a store with an index.
-fn draw_scene(name: &str, folder: &Path) {
+fn draw_scene(name: &str, chunk: usize, folder: &Path) {
     let scene = common::open(name);
     let volume = scene.load_volume().unwrap();
     let label = common::label(name);
-    let store = folder.join(format!("{label}.zarr"));
+    let store = folder.join(format!("{label}-{chunk}.zarr"));
     if !store.exists() {
-        make_plain(&store, &volume);
+        make_plain(&store, &volume, chunk);
     }
-    let index = folder.join(format!("{label}.index"));
+    let index = folder.join(format!("{label}-{chunk}.index"));
     let mut process = Command::new(env!("CARGO_BIN_EXE_sheetsplat"));
     assert!(process.arg("index").arg(&store).arg("-o").arg(&index).status().unwrap().success());
     let indexed = {
@@ -96,7 +98,7 @@ fn draw_scene(name: &str, folder: &Path) {
         let index = index.display().to_string();
         let arguments = ["--memory", &memory, "--index", &index];
         let run = draw(Path::new(name), &arguments, &streamed, classification, folder);
-        print_row(&format!("{label} in chunks of {CHUNK_OF_SCENE}³"), classification, &run, visible);
+        print_row(&format!("{label} in chunks of {chunk}³"), classification, &run, visible);
     }
 }
 
@@ -236,7 +238,7 @@ fn make_level(folder: &Path, side: usize) {
 }
 
 /// Writes the values of a volume as an OME-Zarr store of one level.
-fn make_plain(store: &Path, volume: &Volume) {
+fn make_plain(store: &Path, volume: &Volume, side: usize) {
     let [nx, ny, nz] = volume.dims().to_array().map(|n| n as usize);
     let [x, y, z] = volume.spacing().to_array();
     let axes = ["z", "y", "x"].map(|name| json!({ "name": name, "type": "space" }));
@@ -244,15 +246,14 @@ fn make_plain(store: &Path, volume: &Volume) {
     let datasets = json!([{ "path": "0", "coordinateTransformations": transformations }]);
     let ome = json!({ "version": "0.5", "multiscales": [{ "axes": axes, "datasets": datasets }] });
     let group = json!({ "zarr_format": 3, "node_type": "group", "attributes": { "ome": ome } });
-    let array = metadata([nz, ny, nx], "float32", CHUNK_OF_SCENE, &json!({ "endian": "little" }));
-    let chunks = [nx, ny, nz].map(|n| n.div_ceil(CHUNK_OF_SCENE));
+    let array = metadata([nz, ny, nx], "float32", side, &json!({ "endian": "little" }));
+    let chunks = [nx, ny, nz].map(|n| n.div_ceil(side));
     fs::create_dir_all(store.join("0")).unwrap();
     fs::write(store.join("zarr.json"), group.to_string()).unwrap();
     fs::write(store.join("0/zarr.json"), array.to_string()).unwrap();
     for at in 0..chunks.iter().product() {
         let [i, j, k] = [at % chunks[0], at / chunks[0] % chunks[1], at / (chunks[0] * chunks[1])];
-        let values = (0..CHUNK_OF_SCENE.pow(3)).map(|at| {
-            let side = CHUNK_OF_SCENE;
+        let values = (0..side.pow(3)).map(|at| {
             let [x, y, z] = [i * side + at % side, j * side + at / side % side, k * side + at / (side * side)];
             // Chunks at the end are whole in the file.
             if x < nx && y < ny && z < nz { volume.values()[x + nx * (y + ny * z)] } else { 0.0 }

@@ -37,6 +37,9 @@ pub struct Stats {
     pub stages_ms: StageTimes,
     /// Bytes of GPU memory that the frame uses.
     pub gpu_bytes: u64,
+    /// The largest resident set of the process until then, in MiB, if the program measured it: where a volume is streamed, on systems that tell.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub peak_rss_mib: Option<f64>,
     /// Milliseconds to load or make the volume.
     pub load_ms: f64,
     /// Milliseconds to classify, bucket and upload.
@@ -89,6 +92,10 @@ pub struct StoreCounts {
     /// The most bytes of values and bricks that were in memory at a time. It depends on the order in which threads draw. For a volume that is read as a
     /// whole, the bytes of its values.
     pub chunk_bytes: u64,
+    /// The chunks that were read for the sample of a volume that is streamed.
+    pub sample_chunks_read: u64,
+    /// Their bytes in the store.
+    pub sample_bytes_read: u64,
 }
 
 impl Counts {

@@ -36,15 +36,16 @@ __all__ = ["orbit", "render"]
 
 def render(
     source: Any,
+    scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
     *,
     client: Client | None = None,
     parts: int | None = None,
     spacing: float | Sequence[float] | None = None,
     labels: Any = None,
-    scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
     side: str | None = None,
     backend: str = "cpu",
     memory: int | str | None = None,
+    index: str | os.PathLike[str] | None = None,
     **settings: Any,
 ) -> Future:
     """Draws a picture by the workers of a Dask cluster.
@@ -54,16 +55,20 @@ def render(
     source : path, array or Scene
         What is drawn. Every worker reads a path itself, so it must mean the same file on all of them; an array is
         sent to them. A scene, or the path of a scene file, names its volume.
+    scene : Scene, mapping, str or path, optional
+        How it is drawn, as for `View`.
     client : distributed.Client, optional
         The cluster. Without it, the client that was made last.
     parts : int, optional
         The number of parts of about equal work. Without it, two for each thread of the workers.
-    spacing, labels, scene, side, backend, **settings
+    spacing, labels, side, backend, **settings
         As for `View`.
     memory : int or str, optional
         Bytes that the values may take on each worker, such as ``"2GiB"``; without it, three quarters of a worker's limit.
         A volume that takes more is streamed: each part reads only the chunks that matter to it. State it if
         workers differ, because parts of a streamed volume do not merge with those of one in memory.
+    index : str or path, optional
+        The ranges of the values in the chunks of a volume that is streamed, as for `Volume`; every worker reads it.
 
     Returns
     -------
@@ -78,7 +83,7 @@ def render(
     ``splatting.opacity_threshold = 1`` they are the whole picture's to rounding.
     """
     client = client or default_client()
-    what, look = _sent(client, source, spacing, labels, scene, settings, memory)
+    what, look = _sent(client, source, spacing, labels, scene, settings, memory, index)
     count = _count(client, parts)
     start = _prepare(what, look, side, backend, False)
     return client.compute(_picture(what, start, 0.0, count, backend), retries=3)
@@ -86,6 +91,7 @@ def render(
 
 def orbit(
     source: Any,
+    scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
     *,
     client: Client | None = None,
     count: int = 120,
@@ -94,17 +100,17 @@ def orbit(
     parts: int = 1,
     spacing: float | Sequence[float] | None = None,
     labels: Any = None,
-    scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
     side: str | None = None,
     backend: str = "cpu",
     memory: int | str | None = None,
+    index: str | os.PathLike[str] | None = None,
     **settings: Any,
 ) -> list[Future]:
     """Draws a turntable by the workers of a Dask cluster: a future for each picture.
 
     Parameters
     ----------
-    source, client, spacing, labels, scene, side, backend, memory, **settings
+    source, scene, client, spacing, labels, side, backend, memory, index, **settings
         As for `render`.
     count, turn, frames
         As for `View.orbit`.
@@ -112,7 +118,7 @@ def orbit(
         The number of parts of each picture; 1 is best where there are more pictures than workers.
     """
     client = client or default_client()
-    what, look = _sent(client, source, spacing, labels, scene, settings, memory)
+    what, look = _sent(client, source, spacing, labels, scene, settings, memory, index)
     numbers, count_of_parts = _frames(count, frames), _count(client, parts)
     start = _prepare(what, look, side, backend, True)
     pictures = [_picture(what, start, turn / count * frame, count_of_parts, backend) for frame in numbers]
@@ -130,11 +136,12 @@ class _Source:
     spacing: float | Sequence[float] | None
     labels: Any
     memory: int | str | None
+    index: str | os.PathLike[str] | None
 
     def view(self, scene: Scene, side: str | None, backend: str) -> View:
         # Every worker opens it for the same scene, which decides the level.
         memory = _limit() if self.memory is None else self.memory
-        volume = _opened(self.what, self.look, self.spacing, self.labels, memory, progress=False)
+        volume = _opened(self.what, self.look, self.spacing, self.labels, memory, False, self.index)
         return View(volume, scene=scene, side=side, backend=backend)
 
 
@@ -152,6 +159,7 @@ def _sent(
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None,
     settings: dict[str, Any],
     memory: int | str | None,
+    index: str | os.PathLike[str] | None,
 ) -> tuple[Any, Scene]:
     """The source as the workers get it, sent once to each that needs it, and the scene, which is checked here."""
     if isinstance(source, Volume):
@@ -165,7 +173,9 @@ def _sent(
         if isinstance(source, (str, os.PathLike)):
             path = os.fsdecode(source)
             source = path if path.startswith(_BUILTIN) or "://" in path else os.path.abspath(path)
-    return client.scatter(_Source(uuid.uuid4().hex, source, look, spacing, labels, memory), hash=False), look
+    index = None if index is None else os.path.abspath(index)
+    sent = _Source(uuid.uuid4().hex, source, look, spacing, labels, memory, index)
+    return client.scatter(sent, hash=False), look
 
 
 def _count(client: Client, parts: int | None) -> int:

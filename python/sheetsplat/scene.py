@@ -78,10 +78,16 @@ class Scene:
         """Whether ``volume.path`` or ``volume.builtin`` is stated."""
         return self._native.names_volume
 
-    def load_volume(self, *, memory: int | str | None = None, progress: bool = True) -> Volume:
-        """Opens the volume that the scene names; `memory` and `progress` are as for `Volume`."""
+    def load_volume(
+        self,
+        *,
+        memory: int | str | None = None,
+        progress: bool = True,
+        index: str | os.PathLike[str] | None = None,
+    ) -> Volume:
+        """Opens the volume that the scene names; `memory`, `progress` and `index` are as for `Volume`."""
         with loading(None, progress) as bytes_read:
-            return Volume._of(self._native.load_volume(_memory(memory), bytes_read))
+            return Volume._of(self._native.load_volume(_memory(memory), bytes_read, index))
 
     def explicit(self, volume: Volume, *, all_around: bool = False) -> Scene:
         """The same scene with everything stated that depends on the volume.

@@ -46,6 +46,8 @@ class View:
         As for `Volume`. Of a store with several levels the coarsest is drawn whose voxels are no larger than a pixel.
     progress : bool
         Show a bar while a path is read for more than a second, if tqdm is installed.
+    index : str or path, optional
+        As for `Volume`.
     **settings
         Settings over those of `scene`, as for `Scene`.
 
@@ -71,9 +73,10 @@ class View:
         adapter: str | None = None,
         memory: int | str | None = None,
         progress: bool = True,
+        index: str | os.PathLike[str] | None = None,
         **settings: Any,
     ) -> None:
-        volume, look = _what_and_how(source, spacing, labels, scene, settings, memory, progress)
+        volume, look = _what_and_how(source, spacing, labels, scene, settings, memory, progress, index)
         if side is not None:
             look = look.seen_from(volume, side)
         self._volume, self._scene = volume, look
@@ -185,6 +188,7 @@ def _what_and_how(
     settings: dict[str, Any],
     memory: int | str | None,
     progress: bool,
+    index: str | os.PathLike[str] | None = None,
 ) -> tuple[Volume, Scene]:
     if isinstance(source, Scene) or _is_scene_file(source):
         source = look = Scene(source, **settings)
@@ -195,7 +199,7 @@ def _what_and_how(
         if any(key == "volume" or key.startswith("volume.") for key in settings):
             found, allowed = "a volume beside the source", "no such key: `source`, `spacing` and `labels`"
             raise SceneError(f"volume: found {found}, allowed: {allowed}", "volume", found, allowed)
-    return _opened(source, look, spacing, labels, memory, progress), look
+    return _opened(source, look, spacing, labels, memory, progress, index), look
 
 
 def _opened(
@@ -205,12 +209,13 @@ def _opened(
     labels: Any,
     memory: int | str | None,
     progress: bool,
+    index: str | os.PathLike[str] | None = None,
 ) -> Volume:
     """The volume that a scene names, or another source's for a scene that may choose its level."""
     if isinstance(source, Scene):
-        volume = source.load_volume(memory=memory, progress=progress)
+        volume = source.load_volume(memory=memory, progress=progress, index=index)
     elif isinstance(source, (str, os.PathLike)):
-        volume = Volume._of(_open(source, memory, progress, [None, None, None], look._native))
+        volume = Volume._of(_open(source, memory, progress, [None, None, None], look._native, index))
     elif isinstance(source, Volume):
         volume = source
     else:
@@ -243,7 +248,8 @@ def render(source: Any, **arguments: Any) -> Image:
     source
         What is drawn: an array ``[z, y, x]``, an image of SimpleITK or nibabel, a path, a `Volume` or a `Scene`.
     **arguments
-        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, `progress`, and settings.
+        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, `progress`, `index`, and
+        settings.
 
     Returns
     -------

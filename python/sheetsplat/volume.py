@@ -43,6 +43,9 @@ class Volume:
         that takes more, and can be read by boxes, is streamed: read while it is drawn.
     progress : bool
         Show a bar while a path is read for more than a second, if tqdm is installed.
+    index : str or path, optional
+        The ranges of the values in a path's chunks, made by ``sheetsplat index``: of a volume that is streamed, chunks are not
+        read whose values cannot be seen.
     channel, time, level : int, optional
         The channel, the time and the level of a path that holds several, counted from 0: all channels, the first time
         and the finest level without them.
@@ -69,6 +72,7 @@ class Volume:
         channel: int | None = None,
         time: int | None = None,
         level: int | None = None,
+        index: str | os.PathLike[str] | None = None,
     ) -> None:
         steps = None if spacing is None else _spacing(spacing)
         tags = None if labels is None else _array(labels, "labels")
@@ -79,7 +83,7 @@ class Volume:
         if isinstance(source, Volume):
             self._native = source._native
         elif isinstance(source, (str, os.PathLike)):
-            self._native = _open(source, memory, progress, [channel, time, level], None)
+            self._native = _open(source, memory, progress, [channel, time, level], None, index)
         else:
             array, own_spacing, axes, origin = _converted(source)
             self._native = native.Volume.from_arrays([array], steps or own_spacing, tags, axes, origin)
@@ -157,12 +161,13 @@ def _open(
     progress: bool,
     selection: list[int | None],
     scene: native.Scene | None,
+    index: str | os.PathLike[str] | None = None,
 ) -> native.Volume:
     name = os.fsdecode(path)
     if name.startswith(_BUILTIN):
         return native.Volume.builtin(name.removeprefix(_BUILTIN))
     with loading(name, progress) as bytes_read:
-        return native.Volume.open(name, _memory(memory), selection, scene, bytes_read)
+        return native.Volume.open(name, _memory(memory), selection, scene, bytes_read, index)
 
 
 def _memory(memory: int | str | None) -> str | None:

@@ -71,8 +71,15 @@ impl Scene {
     }
 
     /// The volume that the scene names.
-    fn load_volume(&self, py: Python<'_>, memory: Option<&str>, bytes_read: Option<&BytesRead>) -> PyResult<Volume> {
-        let options = reading(memory, bytes_read)?;
+    #[pyo3(signature = (memory, bytes_read, index=None))]
+    fn load_volume(
+        &self,
+        py: Python<'_>,
+        memory: Option<&str>,
+        bytes_read: Option<&BytesRead>,
+        index: Option<PathBuf>,
+    ) -> PyResult<Volume> {
+        let options = reading(memory, index, bytes_read)?;
         let (volume, _) = py.detach(|| self.scene.open_volume_and_files(&options).map_err(Raised::from))?;
         Ok(Volume(volume))
     }

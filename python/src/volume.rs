@@ -69,9 +69,14 @@ impl BytesRead {
     }
 }
 
-/// The options for reading with a memory limit, such as `2GiB`, and with something that counts the bytes.
-pub(crate) fn reading(memory: Option<&str>, bytes_read: Option<&BytesRead>) -> Result<ReadOptions, Raised> {
+/// The options for reading with a memory limit, such as `2GiB`, with an index of a store's chunks, and with something that counts the bytes.
+pub(crate) fn reading(
+    memory: Option<&str>,
+    index: Option<PathBuf>,
+    bytes_read: Option<&BytesRead>,
+) -> Result<ReadOptions, Raised> {
     let mut options = ReadOptions::default();
+    options.index = index;
     options.bytes_read = bytes_read.map(|read| read.0.clone());
     let parse = |text: &str| {
         let parsed = ReadOptions::parse_memory(text);
@@ -113,6 +118,7 @@ impl Volume {
     /// A volume file, or a folder of slices: the channel, the time and the level that `selection` states. The scene in which it will be shown chooses a level
     /// that is left open, or the finest is taken.
     #[staticmethod]
+    #[pyo3(signature = (path, memory, selection, scene, bytes_read, index=None))]
     fn open(
         py: Python<'_>,
         path: PathBuf,
@@ -120,8 +126,9 @@ impl Volume {
         selection: [Option<u32>; 3],
         scene: Option<&Scene>,
         bytes_read: Option<&BytesRead>,
+        index: Option<PathBuf>,
     ) -> PyResult<Self> {
-        let options = reading(memory, bytes_read)?;
+        let options = reading(memory, index, bytes_read)?;
         let source = VolumeSource::File(path);
         let mut shown = match scene {
             Some(scene) => sheetsplat::Scene { volume: source, ..scene.scene.clone() },

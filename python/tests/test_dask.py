@@ -12,6 +12,7 @@ import pytest
 
 pytest.importorskip("distributed", reason="distributed is not installed")
 
+import distributed
 from distributed import Client, LocalCluster
 
 import sheetsplat
@@ -98,6 +99,20 @@ def test_orbits(client: Client) -> None:
     assert len(images) == 3
     for image, other in zip(images, expected, strict=True):
         assert np.abs(np.asarray(image) - np.asarray(other)).max() < 1e-6
+
+
+def test_a_scene_by_its_place(client: Client) -> None:
+    drawn = sheetsplat.dask.render("builtin:head:32", LOOK, client=client, parts=3).result(timeout=120)
+    np.testing.assert_array_equal(np.asarray(drawn), in_one_process("builtin:head:32", 3, **LOOK))
+    [image] = client.gather(sheetsplat.dask.orbit("builtin:head:32", LOOK, client=client, count=1))
+    assert np.abs(np.asarray(image) - np.asarray(next(sheetsplat.View("builtin:head:32", **LOOK).orbit(count=1)))).max() < 1e-6
+
+
+def test_progress_is_shown(client: Client, capsys: pytest.CaptureFixture[str]) -> None:
+    future = sheetsplat.dask.render("builtin:head:32", LOOK, client=client, parts=6)
+    distributed.progress(future, notebook=False)
+    assert "100% Completed" in capsys.readouterr().out
+    assert isinstance(future.result(timeout=120), sheetsplat.Image)
 
 
 def test_errors_reach_the_caller(client: Client, tmp_path: pathlib.Path) -> None:

@@ -66,6 +66,34 @@ def test_bytes_are_those_of_a_volume_in_memory(ball: pathlib.Path) -> None:
         np.testing.assert_array_equal(*pictures)
 
 
+def write_index(path: pathlib.Path, store: pathlib.Path) -> None:
+    """Writes the index of a store, as ``sheetsplat index`` does. The store's identity is told by the error for another one."""
+    values = Volume(store).values
+    path.write_text("sheetsplat index 1\nidentity 0\n")
+    with pytest.raises(VolumeError, match="identity: found 0") as error:
+        Volume(store, memory=MEMORY, index=path)
+    lines = ["sheetsplat index 1", f"identity {error.value.allowed.split(',')[0]}", "level" + f" {SIDE // CHUNK}" * 3]
+    for at in np.ndindex(*[SIDE // CHUNK] * 3):
+        chunk = values[tuple(slice(CHUNK * a, CHUNK * (a + 1)) for a in at)]
+        lines.append(f"{chunk.min():g} {chunk.max():g}")
+    path.write_text("\n".join(lines) + "\n")
+
+
+def test_an_index_spares_chunks(ball: pathlib.Path, tmp_path: pathlib.Path) -> None:
+    index = tmp_path / "ball.index"
+    write_index(index, ball)
+    look = {**LOOK, "splatting": {"opacity_threshold": 1, "classification": "after"}}
+    look["transfer"] = {"color": [[0, [1, 0.9, 0.8]]], "opacity": [[230, 0], [240, 0.8]]}
+    whole = View(ball, **look).render()
+    plain, indexed = [View(ball, memory=MEMORY, index=path, **look).render() for path in (None, index)]
+    np.testing.assert_array_equal(np.asarray(indexed), np.asarray(whole))
+    assert 0 < indexed.stats["chunks_read"] < plain.stats["chunks_read"]
+    scene = sheetsplat.Scene(volume={"path": str(ball)}, **look)
+    assert scene.load_volume(memory=MEMORY, index=index).streamed
+    with pytest.raises(sheetsplat.FileError, match=r"missing\.index"):
+        View(ball, memory=MEMORY, index=tmp_path / "missing.index")
+
+
 def test_what_needs_all_values_is_refused(ball: pathlib.Path) -> None:
     volume = Volume(ball, memory=MEMORY)
     assert volume.info()["streamed"] and volume.info()["max"] <= 250

@@ -128,6 +128,7 @@ impl Headless {
     /// # Errors
     /// If the volume cannot be loaded, the backend cannot draw one of the scene's settings, the scene has no parts, the window does not lie in
     /// the image, or the device fails.
+    #[doc(alias = "Scene::part")]
     pub fn render_part(&self, scene: &Scene, window: &Window) -> Result<Part, Error> {
         scene.check().map_err(RenderError::from)?;
         let volume = scene.open_volume()?;

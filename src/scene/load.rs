@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{Channel, Scene, VolumeSource};
-use crate::volume::{self, Access, Labels, Selection, Store, Volume, VolumeError, builtin, raw_store};
+use crate::volume::{self, Access, Labels, Selection, SpacedStore, Store, Volume, VolumeError, builtin, raw_store};
 
 /// The scene's volume with all channels, on the first one's grid.
 pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeError> {
@@ -26,19 +26,22 @@ pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeE
     volume.with_channels(&origin(&first.volume), further)
 }
 
-/// The scene's volume to be read by boxes; `None` if it has several channels, labels or a spacing of the scene's, or is no file.
+/// The scene's volume to be read by boxes; `None` if it has several channels or labels, or is no file.
 pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Store>, VolumeError>> {
     let mut channels = scene.channels();
     let (first, None) = (channels.next()?, channels.next()) else { return None };
-    if first.labels.is_some() || first.spacing.is_some() {
+    if first.labels.is_some() {
         return None;
     }
     let access = access.selecting(Selection { channel: first.index, time: first.time, level: None });
-    match &first.volume {
-        VolumeSource::File(path) => Some(volume::store(path, &access)),
-        VolumeSource::Raw(path, layout) => Some(raw_store(path, layout, &access)),
-        VolumeSource::Builtin(_) | VolumeSource::Memory => None,
-    }
+    let store = match &first.volume {
+        VolumeSource::File(path) => volume::store(path, &access),
+        VolumeSource::Raw(path, layout) => raw_store(path, layout, &access),
+        VolumeSource::Builtin(_) | VolumeSource::Memory => return None,
+    };
+    let Some(spacing) = first.spacing else { return Some(store) };
+    let spaced = |store| Ok(Arc::new(SpacedStore::new(&origin(&first.volume), store, spacing)?) as Arc<dyn Store>);
+    Some(store.and_then(spaced))
 }
 
 /// Where a volume comes from, for errors.

@@ -1,13 +1,13 @@
 //! Opening a scene's volume: in memory, or where it fits into none, to be read while it is drawn.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::names::{METHODS, name_of};
 use super::{Scene, load};
 use crate::error::setting::SettingError;
 use crate::settings::splatting::{Classification, Interpolation, Method, Splatting};
-use crate::volume::{Access, Grid, ReadOptions, StreamedVolume, Volume, VolumeError};
+use crate::volume::{Access, Grid, IndexedStore, ReadOptions, Store, StoreIndex, StreamedVolume, Volume, VolumeError};
 
 /// A volume that can be drawn.
 #[derive(Clone, Debug)]
@@ -78,7 +78,7 @@ impl Scene {
     pub fn open_volume_and_files(&self, options: &ReadOptions) -> Result<(OpenVolume, Vec<PathBuf>), VolumeError> {
         let scene = self.choose_levels(options, Self::explicit)?;
         let access = Access::new(options)?;
-        if let Some(volume) = streamed(&scene, options.memory_limit(), &access)? {
+        if let Some(volume) = streamed(&scene, options, &access)? {
             return Ok((volume.into(), access.files()));
         }
         // What the store reserved is free again.
@@ -118,7 +118,8 @@ impl Scene {
 
 /// The scene's volume, if it has one channel, can be read by boxes, and fits into no memory; `None` for any other. A file that cannot be opened gives
 /// `None` too: reading it as a whole then tells why.
-fn streamed(scene: &Scene, memory: u64, access: &Access) -> Result<Option<StreamedVolume>, VolumeError> {
+fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Option<StreamedVolume>, VolumeError> {
+    let memory = options.memory_limit();
     let Some(Ok(store)) = load::store(scene, access) else { return Ok(None) };
     let level = scene.level.unwrap_or(0) as usize;
     let Some(of) = store.levels().get(level) else { return Ok(None) };
@@ -128,5 +129,16 @@ fn streamed(scene: &Scene, memory: u64, access: &Access) -> Result<Option<Stream
     if bytes(of.grid.dims.to_array()) <= memory || least > memory / 2 {
         return Ok(None);
     }
+    let store = match &options.index {
+        Some(path) => indexed(store, path, access)?,
+        None => store,
+    };
     StreamedVolume::new(&load::origin(&scene.volume), store, level, memory).map(Some)
+}
+
+/// A store with the index in a file.
+fn indexed(store: Arc<dyn Store>, path: &Path, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
+    let text = access.text(path)?.map_err(|source| VolumeError::Io { path: path.to_owned(), source })?;
+    let origin = path.display().to_string();
+    Ok(Arc::new(IndexedStore::new(store, StoreIndex::decode(&origin, &text)?, &origin)?))
 }

@@ -38,6 +38,9 @@ pub struct ReadOptions {
     /// The level, from 0 for the finest, to read of a store with several; `None` reads the one that a scene chooses
     /// ([`Scene::choose_levels`](crate::Scene::choose_levels)), and without a scene the finest, which must fit in memory.
     pub level: Option<u32>,
+    /// The file with the ranges of the values in a store's chunks, made by `sheetsplat index` ([`StoreIndex`](super::StoreIndex)). Where a scene's volume is
+    /// streamed, chunks without visible values are not read.
+    pub index: Option<PathBuf>,
     /// Files in memory, which are read instead of the disk's; `None` reads the disk.
     pub files: Option<Files>,
     /// What counts the bytes that are read, for programs that show how far they are.
@@ -63,6 +66,11 @@ impl ReadOptions {
     /// These options with another level of a store with several, counted from 0 for the finest.
     pub fn with_level(self, level: u32) -> Self {
         Self { level: Some(level), ..self }
+    }
+
+    /// These options with an index of the store's chunks.
+    pub fn with_index(self, index: impl Into<PathBuf>) -> Self {
+        Self { index: Some(index.into()), ..self }
     }
 
     /// These options with files in memory instead of the disk's, where a program has no disk, as in a browser, or does not trust paths. Whatever

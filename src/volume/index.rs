@@ -164,6 +164,8 @@ fn numbers<T: std::str::FromStr, const N: usize>(text: &str) -> Option<[T; N]> {
 pub struct IndexedStore {
     store: Arc<dyn Store>,
     index: StoreIndex,
+    /// The index, for errors.
+    origin: String,
 }
 
 impl IndexedStore {
@@ -183,7 +185,48 @@ impl IndexedStore {
         if ours != theirs {
             return Err(invalid_in(origin, "level", chunks(theirs), format!("{}, those of the store", chunks(ours))));
         }
-        Ok(Self { store, index })
+        Ok(Self { store, index, origin: origin.to_owned() })
+    }
+
+    /// Checks that the index has the fill value alone for a chunk that the store does not hold: it was made when the store held others.
+    fn check_absent(&self, level: usize, chunk: UVec3) -> Result<(), VolumeError> {
+        let absent = of_values(&[self.store.fill()]);
+        match self.chunk_range(level, chunk) {
+            Some(range) if range != absent => {
+                let [min, max] = range;
+                let found = format!("no chunk {chunk} of level {level} in the store");
+                let values =
+                    if range == EMPTY { "only holes".to_owned() } else { format!("values from {min} to {max}") };
+                Err(invalid_in(&self.origin, "chunk", found, format!("the one with {values} that the index tells of")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Checks that chunks are held which share voxels with a box and are told to have other values than the fill value, given the box's values. If all that
+    /// was read of one is the fill value, the store may lack it.
+    fn check_read(&self, level: usize, (from, dims): (UVec3, UVec3), values: &[f32]) -> Result<(), VolumeError> {
+        let (side, fill) = (self.levels()[level].chunk, self.store.fill());
+        let absent = of_values(&[fill]);
+        let is_fill = |voxel: UVec3| {
+            let [x, y, z] = (voxel - from).to_array().map(|n| n as usize);
+            let value = values[x + dims.x as usize * (y + dims.y as usize * z)];
+            value == fill || value.is_nan() && fill.is_nan()
+        };
+        let (first, last) = (from / side, (from + dims - 1) / side);
+        let rows = (first.z..=last.z).flat_map(|z| (first.y..=last.y).map(move |y| (y, z)));
+        for chunk in rows.flat_map(|(y, z)| (first.x..=last.x).map(move |x| UVec3::new(x, y, z))) {
+            if self.chunk_range(level, chunk).is_none_or(|range| range == absent) {
+                continue;
+            }
+            let (low, end) = (from.max(chunk * side), (from + dims).min((chunk + 1) * side));
+            let mut voxels = (low.z..end.z)
+                .flat_map(|z| (low.y..end.y).flat_map(move |y| (low.x..end.x).map(move |x| UVec3::new(x, y, z))));
+            if voxels.all(is_fill) {
+                self.contains(level, chunk)?;
+            }
+        }
+        Ok(())
     }
 }
 
@@ -193,11 +236,18 @@ impl Store for IndexedStore {
     }
 
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
-        self.store.read(level, from, dims, values)
+        let bytes = self.store.read(level, from, dims, values)?;
+        self.check_read(level, (from, dims), values)?;
+        Ok(bytes)
     }
 
+    /// A chunk that the store lacks, although the index tells values of it, is an error.
     fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError> {
-        self.store.contains(level, chunk)
+        let is_held = self.store.contains(level, chunk)?;
+        if !is_held {
+            self.check_absent(level, chunk)?;
+        }
+        Ok(is_held)
     }
 
     fn fill(&self) -> f32 {

@@ -1,6 +1,7 @@
 //! Scalar volumes: dimensions, spacing and values, without any appearance.
 
 mod access;
+mod adapted;
 mod address;
 pub mod builtin;
 mod channels;
@@ -64,6 +65,8 @@ use rayon::prelude::*;
 
 pub(crate) use access::Access;
 pub use access::ReadOptions;
+pub use adapted::ChunkProgress;
+pub(crate) use adapted::SpacedStore;
 pub(crate) use address::{is_address, written_in};
 use coefficients::KeptCoefficients;
 pub use colors::Texel;

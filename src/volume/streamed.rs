@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use super::{Grid, IndexedStore, Store, StoreIndex, Volume, VolumeError, sample};
+use super::adapted::WatchedStore;
+use super::{ChunkProgress, Grid, IndexedStore, Store, StoreIndex, Volume, VolumeError, sample};
+use crate::stats::StoreCounts;
 
 /// A level of a store that is drawn without being in memory as a whole (SPEC §13).
 #[derive(Clone, Debug)]
@@ -42,6 +44,18 @@ impl StreamedVolume {
     pub fn with_index(self, index: StoreIndex, origin: &str) -> Result<Self, VolumeError> {
         let store = Arc::new(IndexedStore::new(self.store, index, origin)?);
         Ok(Self { store, ..self })
+    }
+
+    /// The same volume, with a function that is told of every chunk of the level when it is read for the first time. Several threads may call it at once.
+    pub fn watched_by(self, progress: Arc<ChunkProgress>) -> Self {
+        let store = Arc::new(WatchedStore::new(self.store, self.level, progress));
+        Self { store, ..self }
+    }
+
+    /// The counts of a frame with those of reading the sample.
+    pub(crate) fn with_sample(&self, counts: StoreCounts) -> StoreCounts {
+        let of_sample = self.sample.reads().unwrap_or_default();
+        StoreCounts { sample_chunks_read: of_sample.chunks_read, sample_bytes_read: of_sample.bytes_read, ..counts }
     }
 
     /// The grid of the level that is drawn.

@@ -25,6 +25,8 @@ mod rasterizers;
 #[path = "../common/http.rs"]
 mod server;
 mod statistics;
+#[cfg(feature = "zarr")]
+mod stores;
 mod streaming;
 mod sweep;
 

@@ -33,6 +33,7 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
     assert!((1..=27).contains(&of("chunks_read")), "{stats}");
     assert_eq!(of("bytes_read") % 64, 0);
     assert!(of("chunk_bytes") <= 17 << 20, "{stats}");
+    assert_eq!((of("sample_chunks_read"), of("sample_bytes_read")), (27, 192 * 160 * 155), "{stats}");
 
     // With an index the same bytes after splatting, too.
     let after = format!("{stated} --set splatting.classification=after");
@@ -47,6 +48,9 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
     folder
         .run(&format!("index {ball} -o ball.raw"))
         .assert_failure(2, &["--output: found ball.raw, which is also the input"]);
+    folder
+        .run(&format!("index {ball} --index ball.index -o no.index"))
+        .assert_failure(2, &["--index: found an index for the store, allowed: --output"]);
     folder
         .run("index builtin:head -o no.index")
         .assert_failure(2, &["builtin:head: found a volume that is not read by boxes"]);
@@ -84,12 +88,31 @@ fn everything_is_drawn_of_a_volume_larger_than_memory() {
             assert!(folder.read(&format!("streamed{end}")) == folder.read(&format!("whole{end}")), "{end}");
         }
     };
+    // With an index, and without one.
+    folder.run(&format!("index {ball} -o ball.index")).assert_success();
     run("orbit", "-o NAME-#.npy --count 3 --frames 1..3");
     assert_same(&["-1.npy", "-2.npy"]);
-    run("sweep", "-o NAME.npy --set splatting.slab_width=1,2");
+    run("orbit", "-o NAME-i#.npy --count 3 --frames 1..2 --index ball.index");
+    assert_same(&["-i1.npy"]);
+    run("sweep", "-o NAME.npy --set splatting.slab_width=1,2 --index ball.index");
     assert_same(&[".npy"]);
+    let chunks = |index: &str| {
+        let bench = folder.run_with(&two, "", &format!("bench {ball} {stated} --frames 1 --memory 17MiB{index}"));
+        let report: Value =
+            serde_json::from_str(&bench.stdout).unwrap_or_else(|error| panic!("{error}: {}", bench.stderr));
+        report["chunks_read"].as_u64().unwrap()
+    };
+    // Without one, chunks beside the ball are read to find that they are empty.
+    assert!(chunks(" --index ball.index") <= chunks(""));
+    for command in ["orbit", "sweep --set splatting.slab_width=1,2", "split -n 2"] {
+        let output = if command == "orbit" { " -o no-#.npy" } else { " -o no.npy" };
+        let output = if command.starts_with("split") { "" } else { output };
+        folder
+            .run_with(&two, "", &format!("{command} {ball} --memory 17MiB --index missing.index{output}"))
+            .assert_failure(2, &["missing.index: "]);
+    }
 
-    let split = folder.run_with(&two, "", &format!("split {ball} {stated} -n 6 --memory 17MiB"));
+    let split = folder.run_with(&two, "", &format!("split {ball} {stated} -n 6 --memory 17MiB --index ball.index"));
     assert_eq!((split.code, split.stdout.lines().count()), (Some(0), 6), "{}", split.stderr);
     for (at, window) in split.stdout.lines().enumerate() {
         run("render", &format!("-o NAME-{at}.exr {window}"));
@@ -112,4 +135,43 @@ fn everything_is_drawn_of_a_volume_larger_than_memory() {
     folder
         .run(&format!("merge {mixed} -o no.npy"))
         .assert_failure(2, &["whole-1.exr: scene: found ", ", as in streamed-0.exr"]);
+}
+
+/// A process that streams has no more in memory than its limit, beside what any process of the program has.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_stays_within_the_limit() {
+    let folder = Folder::new();
+    let side = 256_u32;
+    let value = |index: u32| {
+        let at = [index % side, index / side % side, index / side / side].map(|n| f64::from(n) / f64::from(side) - 0.5);
+        (400.0 * (0.5 - at.iter().map(|n| n * n).sum::<f64>().sqrt())).clamp(0.0, 250.0) as u8
+    };
+    folder.write("ball.raw", (0..side.pow(3)).map(value).collect::<Vec<u8>>());
+    let ball = "ball.raw --dims 256,256,256 --type uint8";
+    let set = "--backend cpu --set image={width=96,height=96} --set camera.fit=volume --set transfer.opacity=[[60,0],[80,1]] \
+               --set transfer.color=[[0,[1,1,1]]]";
+    let two = [("RAYON_NUM_THREADS", "2")];
+    let peak = |what: &str| {
+        let run = folder.run_with(&two, "", &format!("bench {what} {set} --frames 1"));
+        let report: Value = serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {}", run.stderr));
+        report["peak_rss_mib"].as_f64().unwrap()
+    };
+    let base = peak("builtin:head:8");
+    // The values take 64 MiB.
+    for classification in ["before", "after"] {
+        let set = format!("--set splatting.classification={classification}");
+        let streamed = peak(&format!("{ball} {set} --memory 40MiB"));
+        let whole = peak(&format!("{ball} {set}"));
+        println!("{classification}: {base:.0} MiB without a volume, {streamed:.0} streamed, {whole:.0} in memory");
+        assert!(streamed - base <= 40.0 && whole - base >= 64.0, "{base} {streamed} {whole}");
+    }
+    folder
+        .run_with(&two, "", &format!("render {ball} {set} --memory 40MiB -o a.npy --stats stats.json"))
+        .assert_success();
+    let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
+    assert!((base..base + 40.0).contains(&stats["peak_rss_mib"].as_f64().unwrap()), "{base} {stats}");
+    folder.run(&format!("render builtin:head:8 {set} -o a.npy --stats stats.json")).assert_success();
+    let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
+    assert!(stats["peak_rss_mib"].is_null() && stats["sample_chunks_read"].is_null(), "{stats}");
 }

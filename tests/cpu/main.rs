@@ -4,6 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod after;
+mod chunks;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
@@ -13,6 +14,8 @@ mod modes;
 mod picks;
 mod regions;
 mod scenes;
+#[cfg(feature = "zarr")]
+mod stores;
 mod streams;
 mod surfaces;
 

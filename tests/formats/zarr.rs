@@ -94,6 +94,34 @@ fn missing_chunks_have_the_fill_value() {
     assert!((1..1000).contains(&read), "{read}");
 }
 
+/// Version 2 may leave open what voxels are whose chunk is absent.
+#[test]
+fn chunks_without_a_fill_value_must_be_there() {
+    let folder = Folder::new();
+    let metadata = |fill: Value| {
+        json!({
+            "zarr_format": 2, "shape": [2, 2, 4], "chunks": [2, 2, 2], "dtype": "|u1", "fill_value": fill, "order": "C",
+            "compressor": null, "filters": null, "dimension_separator": ".",
+        })
+        .to_string()
+        .into_bytes()
+    };
+    let chunk = [1, 2, 3, 4, 5, 6, 7, 8];
+    let null = folder.store(&[(".zarray", &metadata(Value::Null)), ("0.0.0", &chunk)]);
+    assert_error(Volume::open(&null), "chunk", &["0.0.1", "found nothing", "a fill_value other than null"]);
+    let store = open_store(&null, &ReadOptions::default()).unwrap();
+    assert!(store.contains(0, UVec3::ZERO).unwrap());
+    assert_error(store.contains(0, UVec3::X), "chunk", &["0.0.1"]);
+    let mut values = [0.0; 8];
+    assert_error(store.read(0, UVec3::X, UVec3::splat(2), &mut values), "chunk", &["0.0.1"]);
+    store.read(0, UVec3::ZERO, UVec3::splat(2), &mut values).unwrap();
+    assert_error(sample("null", &*store, u64::MAX), "chunk", &["0.0.1"]);
+    let whole = folder.store(&[(".zarray", &metadata(Value::Null)), ("0.0.0", &chunk), ("0.0.1", &chunk)]);
+    assert_eq!(Volume::open(&whole).unwrap().values().iter().sum::<f32>(), 72.0);
+    let seven = folder.store(&[(".zarray", &metadata(json!(7))), ("0.0.0", &chunk)]);
+    assert_eq!(Volume::open(&seven).unwrap().value(UVec3::new(3, 0, 0)), 7.0);
+}
+
 #[test]
 fn images_of_ome_zarr() {
     for name in ["image-0.4.zarr", "image-0.5.zarr"] {

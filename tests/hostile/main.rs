@@ -73,6 +73,10 @@ fn victims(folder: &Path) -> Vec<Victim> {
     for slices in ["series", "slices", "channels"] {
         files(&fixtures.join(slices), &folder.join(slices));
     }
+    // A store in an archive.
+    let archive = folder.join("ngff.ozx");
+    fs::copy(fixtures.join("zarr/ngff.ozx"), &archive).unwrap();
+    victims.push(Victim { file: archive.clone(), open: archive });
     for name in STORES {
         let store = folder.join(name);
         copy_store(&fixtures.join(name), &store, &store, &mut victims);
@@ -101,7 +105,7 @@ fn copy_store(from: &Path, to: &Path, store: &Path, victims: &mut Vec<Victim>) {
 
 /// The options for a path. A store may lack chunks, so that its size limits its values only where memory does.
 fn options(path: &Path) -> ReadOptions {
-    let is_store = path.extension().is_some_and(|extension| extension == "zarr");
+    let is_store = path.extension().is_some_and(|extension| extension == "zarr" || extension == "ozx");
     if is_store { ReadOptions::default().with_memory(4 << 20) } else { ReadOptions::default() }
 }
 
@@ -200,6 +204,7 @@ fn mutate_scenes(random: &mut Random) -> Count {
 fn damaged_files_are_volumes_or_errors() {
     let folder = tempfile::tempdir().unwrap();
     promises::are_refused(folder.path());
+    promises::of_stores_are_refused(folder.path());
     let mut random = Random::new();
     for (what, least, count) in [
         ("files", FILES, mutate_files(&mut random)),

@@ -3,9 +3,10 @@
 use std::fs;
 use std::path::Path;
 
-use sheetsplat::volume::Volume;
+use glam::UVec3;
+use sheetsplat::volume::{ReadOptions, Volume, open_store};
 
-use crate::bounded;
+use crate::{ROOM, bounded};
 
 /// The number of bytes of code in every file.
 const CODE: usize = 1 << 20;
@@ -51,6 +52,50 @@ pub(crate) fn are_refused(folder: &Path) {
         fs::write(&path, &bytes).unwrap();
         let result = bounded(&name, bytes.len(), || Volume::open(&path), |_| 0);
         assert!(result.is_err(), "{name}");
+    }
+}
+
+/// Stores whose metadata promise more chunks, larger ones, or more chunks in a shard than anyone has, and a shard whose index leads beyond it.
+pub(crate) fn of_stores_are_refused(folder: &Path) {
+    let array = |shape: &str, chunk: &str, codecs: &str| {
+        format!(
+            "{{\"zarr_format\":3,\"node_type\":\"array\",\"shape\":[{shape}],\"data_type\":\"uint8\",\"fill_value\":0,\
+             \"chunk_grid\":{{\"name\":\"regular\",\"configuration\":{{\"chunk_shape\":[{chunk}]}}}},\
+             \"chunk_key_encoding\":{{\"name\":\"default\"}},\"codecs\":[{codecs}]}}"
+        )
+    };
+    let bytes = "{\"name\":\"bytes\"}";
+    let little = "{\"name\":\"bytes\",\"configuration\":{\"endian\":\"little\"}}";
+    let sharded = |chunk: &str| {
+        format!(
+            "{{\"name\":\"sharding_indexed\",\"configuration\":{{\"chunk_shape\":[{chunk}],\"codecs\":[{bytes}],\
+             \"index_codecs\":[{little}],\"index_location\":\"end\"}}}}"
+        )
+    };
+    let gzip = format!("{bytes},{{\"name\":\"gzip\",\"configuration\":{{\"level\":5}}}}");
+    let far = [u64::MAX / 2, 100, u64::MAX, u64::MAX, 0, 1 << 40, 7, u64::MAX - 3].map(u64::to_le_bytes).concat();
+    for (name, metadata, chunk) in [
+        ("many", array("1000,1000,1000", "1,1,1", bytes), vec![0]),
+        ("large", array("1000000,1000000,1000000", "1000000,1000000,1000000", bytes), vec![0; CODE]),
+        ("deep", array("1000,1000,1000", "1000,1000,1000", &gzip), vec![0; CODE]),
+        ("shards", array("4096,4096,4096", "4096,4096,4096", &sharded("1,1,1")), vec![0xff; CODE]),
+        ("indices", array("2048,2048,2048", "2048,2048,2048", &sharded("16,16,16")), vec![0; CODE]),
+        ("beyond", array("2,2,2", "2,2,2", &sharded("1,2,1")), far),
+    ] {
+        let path = folder.join(format!("{name}.zarr"));
+        fs::create_dir_all(path.join("c/0/0")).unwrap();
+        fs::write(path.join("zarr.json"), &metadata).unwrap();
+        fs::write(path.join("c/0/0/0"), &chunk).unwrap();
+        let size = metadata.len() + chunk.len();
+        let options = ReadOptions::default().with_memory(ROOM as u64);
+        let result = bounded(name, size, || Volume::open_with(&path, &options), |_| 0);
+        assert!(result.is_err(), "{name}");
+        // By boxes a store may be opened that does not fit.
+        let store = bounded(name, size, || open_store(&path, &options), |_| 0);
+        let Ok(store) = store else { continue };
+        let side = UVec3::ONE.min(store.levels()[0].grid.dims);
+        let read = bounded(name, size, || store.read(0, UVec3::ZERO, side, &mut [0.0]), |_| 0);
+        assert!(read.is_err(), "{name}: {read:?}");
     }
 }
 

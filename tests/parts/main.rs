@@ -7,5 +7,6 @@
 mod common;
 mod files;
 mod merging;
+mod scans;
 mod splitting;
 mod streamed;

@@ -12,7 +12,7 @@ use sheetsplat::headless::{Backend, Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{OpenVolume, Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
-use sheetsplat::volume::{self, Orientation, StreamedVolume, Volume};
+use sheetsplat::volume::{self, Orientation, ReadOptions, StreamedVolume, Volume};
 
 use crate::failure::Failure;
 use crate::outputs::Outputs;
@@ -33,6 +33,10 @@ pub(crate) struct Input {
     look: Look,
     #[command(flatten)]
     pub(crate) reading: Reading,
+    /// The ranges of the values in the volume's chunks, made by `sheetsplat index`: where the volume fits into no memory, chunks are not read whose values
+    /// cannot be seen.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) index: Option<PathBuf>,
     /// The side of the patient to look at, if the volume's file states how the patient lies; replaces the scene's camera.direction
     /// and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
@@ -147,6 +151,13 @@ impl From<View> for volume::PatientSide {
 }
 
 impl Input {
+    /// The options for reading the scene and its volume.
+    pub(crate) fn options(&self) -> ReadOptions {
+        let mut options = self.reading.options();
+        options.index.clone_from(&self.index);
+        options
+    }
+
     pub(crate) fn scene(&self) -> Result<Scene, SceneError> {
         self.scene_with(&self.sets)
     }
@@ -170,7 +181,7 @@ impl Input {
             self.raw.sets(time).into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
         match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
-            None if self.is_scene_file() => Scene::open_with(self.name.as_ref(), &sets, &self.reading.options()),
+            None if self.is_scene_file() => Scene::open_with(self.name.as_ref(), &sets, &self.options()),
             None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
         }
     }
@@ -182,7 +193,7 @@ impl Input {
     /// The input files named by the arguments and the scene. A header may name more.
     pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
         let scene_file = self.is_scene_file().then(|| self.name.clone().into());
-        let mut files: Vec<PathBuf> = scene_file.into_iter().collect();
+        let mut files: Vec<PathBuf> = scene_file.into_iter().chain(self.index.clone()).collect();
         for channel in scene.channels() {
             files.extend(channel.volume.path().map(Path::to_path_buf));
             files.extend(channel.labels.clone());
@@ -196,7 +207,7 @@ impl Input {
         scene: &Scene,
         explicit: impl Fn(&Scene, &Volume) -> Scene,
     ) -> Result<Scene, Failure> {
-        let chosen = scene.choose_levels(&self.reading.options(), explicit).map_err(|error| self.failure(error))?;
+        let chosen = scene.choose_levels(&self.options(), explicit).map_err(|error| self.failure(error))?;
         if let Some(level) = chosen.level.filter(|_| scene.level.is_none()) {
             log::info!("{}: level {level} is drawn", self.name);
         }
@@ -221,7 +232,7 @@ impl Input {
     #[cfg(feature = "viewer")]
     pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
         let start = Instant::now();
-        let loaded = scene.load_volume_and_files(&self.reading.options());
+        let loaded = scene.load_volume_and_files(&self.options());
         let (volume, files) = loaded.map_err(|error| self.failure(error))?;
         outputs.refuse(&files)?;
         self.log_volume(&volume, start);
@@ -242,7 +253,7 @@ impl Input {
 
     /// Opens the volume without logging anything.
     pub(crate) fn read_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<OpenVolume, Failure> {
-        let opened = scene.open_volume_and_files(&self.reading.options());
+        let opened = scene.open_volume_and_files(&self.options());
         let (volume, files) = opened.map_err(|error| self.failure(error))?;
         outputs.refuse(&files)?;
         Ok(volume)

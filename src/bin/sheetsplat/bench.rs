@@ -9,6 +9,7 @@ use sheetsplat::stats::Stats;
 
 use crate::arguments::{Input, parse_degrees};
 use crate::failure::Failure;
+use crate::memory::peak_rss_mib;
 use crate::outputs::Outputs;
 use crate::stdout;
 
@@ -75,14 +76,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     };
     let json = serde_json::to_string(&report).map_err(|error| Failure::Other(error.to_string()))?;
     stdout((json + "\n").as_bytes())
-}
-
-/// The process's largest resident set so far, if the system reports it.
-fn peak_rss_mib() -> Option<f64> {
-    let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
-    let kib: f64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
-    Some(kib / 1024.0)
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

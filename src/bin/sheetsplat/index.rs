@@ -1,7 +1,6 @@
 //! `sheetsplat index`.
 
 use std::path::PathBuf;
-use std::sync::{Mutex, PoisonError};
 
 use sheetsplat::volume::{StoreIndex, StoreLevel};
 
@@ -26,18 +25,23 @@ pub(crate) struct Arguments {
 /// Writes the range of the values in every chunk.
 pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
     let Arguments { input, output } = arguments;
+    if input.index.is_some() {
+        return Err(Failure::Input(
+            "--index: found an index for the store, allowed: --output, the index to write".to_owned(),
+        ));
+    }
     let scene = input.scene()?;
     Outputs::check(&[("--output", output)], false, &input.files(&scene))?;
-    let store = scene.open_store(&input.reading.options()).ok_or_else(|| {
-        let allowed = "one file without labels or a spacing of its own";
+    let store = scene.open_store(&input.options()).ok_or_else(|| {
+        let allowed = "one file without labels";
         Failure::Input(format!("{}: found a volume that is not read by boxes, allowed: {allowed}", input.name))
     })?;
     let store = store.map_err(|error| input.failure(error))?;
     let chunks =
         |level: &StoreLevel| level.chunks().to_array().iter().fold(1, |count: u64, &n| count.saturating_mul(n.into()));
     let total = store.levels().iter().map(chunks).fold(0, u64::saturating_add);
-    let bar = Mutex::new(Progress::new(usize::try_from(total).unwrap_or(usize::MAX), progress));
-    let step = || bar.lock().unwrap_or_else(PoisonError::into_inner).step();
+    let bar = Progress::new(usize::try_from(total).unwrap_or(usize::MAX), progress);
+    let step = || bar.step();
     let index = StoreIndex::new(&*store, &input.name, &step).map_err(|error| input.failure(error))?;
     drop(bar);
     outputs::write(&[(output, index.encode().into_bytes())], &[])

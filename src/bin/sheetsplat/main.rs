@@ -12,6 +12,7 @@ mod failure;
 mod index;
 mod info;
 mod interrupt;
+mod memory;
 mod orbit;
 mod outputs;
 mod parts;
@@ -65,7 +66,7 @@ enum Command {
     Bench(bench::Arguments),
     /// Merge parts, drawn by render --slabs and --region, into the image.
     Merge(parts::merge::Arguments),
-    /// Write the ranges of the values in a volume's chunks, for render --index.
+    /// Write the ranges of the values in a volume's chunks, for --index.
     Index(index::Arguments),
     /// Print --slabs and --region of parts that take about equal time, a line for each.
     Split(parts::split::Arguments),
@@ -96,7 +97,7 @@ fn main() -> ExitCode {
     interrupt::listen();
     let progress = !quiet && !verbose;
     let result = match command {
-        Command::Render(arguments) => render::run(&arguments),
+        Command::Render(arguments) => render::run(&arguments, progress),
         Command::Orbit(arguments) => orbit::run(&arguments, progress),
         Command::Sweep(arguments) => sweep::run(&arguments, progress),
         Command::Bench(arguments) => bench::run(&arguments),

@@ -1,18 +1,19 @@
 //! `sheetsplat render`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
 use sheetsplat::scene::{OpenVolume, Scene};
-use sheetsplat::volume::StoreIndex;
 
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
 use crate::failure::Failure;
+use crate::memory::peak_rss_mib;
 use crate::outputs::{self, Outputs};
 use crate::parts::Part;
+use crate::progress::Progress;
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -39,10 +40,6 @@ pub(crate) struct Arguments {
     /// Write the complete scene that was rendered as a scene file, with everything that presets, colour maps and the volume determined.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
-    /// The ranges of the values in the volume's chunks, made by `sheetsplat index`: where the volume fits into no memory, chunks are not read whose values
-    /// cannot be seen.
-    #[arg(long, value_name = "FILE")]
-    index: Option<PathBuf>,
     #[command(flatten)]
     annotate: Annotate,
     #[command(flatten)]
@@ -52,8 +49,8 @@ pub(crate) struct Arguments {
     profile: bool,
 }
 
-pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
-    let Arguments { input, output, stats: stats_file, save_scene, index, .. } = arguments;
+pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
+    let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
     check_files(arguments)?;
     // Like a frame of `orbit`, a part is drawn once.
     if arguments.part.is_done(output) {
@@ -64,18 +61,18 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let mut named = vec![("--output", output.as_path())];
     named.extend(stats_file.as_deref().map(|path| ("--stats", path)));
     named.extend(save_scene.as_deref().map(|path| ("--save-scene", path)));
-    let mut files = input.files(&scene);
-    files.extend(index.clone());
-    let outputs = Outputs::check(&named, arguments.profile, &files)?;
+    let outputs = Outputs::check(&named, arguments.profile, &input.files(&scene))?;
     let start = Instant::now();
     let scene = input.choose_levels(&scene, Scene::explicit)?;
     let volume = input.open_volume(&scene, &outputs)?;
-    let volume = index.as_deref().map_or(Ok(volume.clone()), |index| indexed(input, volume, index))?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     let start = Instant::now();
     let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
     let overlay = arguments.annotate.overlay(&scene, volume.sample())?;
+    let is_streamed = matches!(volume, OpenVolume::Streamed(_));
+    let bar = Progress::of_chunks(progress);
+    let volume = bar.watch(volume);
     let (bytes, mut stats) = match arguments.part.window(&scene) {
         Some(window) => {
             let (part, stats) = arguments.part.draw(input, volume, &scene, &window)?;
@@ -88,6 +85,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
             (image.encode(output, arguments.depth.into())?, stats)
         }
     };
+    drop(bar);
+    stats.peak_rss_mib = peak_rss_mib().filter(|_| is_streamed);
     stats.load_ms = load_ms;
     stats.prepare_ms += explicit_ms;
     log_frame(&output.display().to_string(), &stats);
@@ -105,16 +104,6 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // The map is empty without --profile.
     let profile: String = stats.stages_ms.iter().map(|(stage, ms)| format!("{stage:10} {ms:10.3} ms\n")).collect();
     outputs::write(&files, profile.as_bytes())
-}
-
-/// The volume with the index in a file, if it is streamed; one in memory needs none.
-fn indexed(input: &Input, volume: OpenVolume, path: &Path) -> Result<OpenVolume, Failure> {
-    let OpenVolume::Streamed(volume) = volume else { return Ok(volume) };
-    let origin = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::Input(format!("{origin}: {error}")))?;
-    let index = StoreIndex::decode(&origin, &text);
-    let volume = index.and_then(|index| volume.with_index(index, &origin));
-    Ok(volume.map_err(|error| input.failure(error))?.into())
 }
 
 /// Checks the extensions of the files to be written.

@@ -167,7 +167,9 @@ impl StreamRenderer {
             chunks_read: chunks.len() as u64,
             bytes_read: bytes,
             chunk_bytes: most_held,
+            ..StoreCounts::default()
         };
+        let store = self.volume.with_sample(store);
         Ok((content, Stats { store: Some(store), ..statistics(self.simd, size, counts, start) }))
     }
 

@@ -16,7 +16,7 @@ use crate::volume::range::{EMPTY, union};
 use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
 
 /// The minimum number of voxels along each axis of a chunk that is drawn. Smaller chunks of the store are read together.
-const LEAST_SIDE: u32 = 32;
+const LEAST_SIDE: u32 = 16;
 
 /// The maximum number of chunks that are drawn, and of voxels in each.
 const MOST_CHUNKS: u128 = 1 << 24;

@@ -112,6 +112,7 @@ impl BoxedView {
             chunks_total: level.chunks().as_u64vec3().element_product(),
             ..chunks.counts()
         };
+        let store = volume.with_sample(store);
         let counts = Counts { voxels_total: volume.grid().voxels(), ..stats.counts };
         let [width, height] = view.size;
         // Nothing may have been drawn.

@@ -40,6 +40,8 @@ pub(super) struct ZarrArray {
     axes: Axes,
     pub(super) kind: SampleType,
     is_half: bool,
+    /// Whether the metadata state the value of voxels in chunks that the store does not hold.
+    has_fill: bool,
     pub(super) shape: Sizes,
     /// The shape of a chunk; of an inner one, where chunks lie in shards.
     chunk: Sizes,
@@ -165,7 +167,9 @@ impl ZarrArray {
         }
         let (shape, chunk) = (axes.sort(shape, 1), axes.sort(&inner, 1));
         let keys = Arc::clone(keys);
-        let opened = Self { keys, metadata, shards, axes, kind, is_half, shape, chunk, in_chunk, array };
+        // In version 2 it may be null.
+        let has_fill = !metadata["fill_value"].is_null();
+        let opened = Self { keys, metadata, shards, axes, kind, is_half, has_fill, shape, chunk, in_chunk, array };
         opened.keys.permit(opened.encoded_bytes());
         Ok(opened)
     }
@@ -261,6 +265,7 @@ impl ZarrArray {
 
     /// A chunk that the store does not hold.
     fn filled<T: Voxel>(&self, place: Sizes) -> Result<Vec<T>, VolumeError> {
+        self.check_absent(place)?;
         let fill = self.widened(self.array.fill_value().as_ne_bytes().to_vec());
         let fill = self.convert::<T>(&fill).map_err(|sample| self.refused::<T>(&self.key(place), sample))?;
         Ok(fill.repeat(self.in_chunk as usize))
@@ -379,9 +384,26 @@ impl ZarrArray {
         let [x, y, z] = chunk.to_array().map(u64::from);
         let place = [time / self.chunk[0], channel / self.chunk[1], z, y, x];
         let key = self.key(place);
-        let Some(shards) = &self.shards else { return Ok(self.keys.bytes(&key)?.is_some()) };
-        let range = shards.range(&self.keys, &key, &self.axes.unsort(place));
-        Ok(range.map_err(|error| self.damaged(&key, place, &error))?.is_some())
+        let is_held = match &self.shards {
+            None => self.keys.bytes(&key)?.is_some(),
+            Some(shards) => {
+                let range = shards.range(&self.keys, &key, &self.axes.unsort(place));
+                range.map_err(|error| self.damaged(&key, place, &error))?.is_some()
+            }
+        };
+        if !is_held {
+            self.check_absent(place)?;
+        }
+        Ok(is_held)
+    }
+
+    /// Checks that a chunk may be absent: that the metadata state its voxels' value.
+    fn check_absent(&self, place: Sizes) -> Result<(), VolumeError> {
+        if self.has_fill {
+            return Ok(());
+        }
+        let allowed = "the chunk, or metadata with a fill_value other than null";
+        Err(invalid(&self.keys.file(&self.key(place)), "chunk", "nothing", allowed))
     }
 
     /// The key of the chunk or the shard in which the chunk at a place lies.

@@ -59,6 +59,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         chunks_read: held.chunks,
         bytes_read: held.bytes,
         chunk_bytes: count * size_of::<T>() as u64,
+        ..StoreCounts::default()
     };
     let spacing = Some(level.grid.spacing);
     let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();

@@ -190,13 +190,14 @@ impl<'a> Shown<'a> {
         let times: Vec<Option<u32>> = frames.iter().map(|&frame| self.time_of(frame, *count)).collect();
         let Self { scene, volume, overlay, outputs, .. } = self;
         let headless = input.headless(false, [&scene])?;
-        let mut shown = (scene.time, Some(headless.view(volume, &scene).map_err(|error| input.failure(error))?));
-        let mut progress = Progress::new(frames.len(), progress);
+        let progress = Progress::new(frames.len(), progress);
+        let view = headless.view(progress.watch(volume), &scene).map_err(|error| input.failure(error))?;
+        let mut shown = (scene.time, Some(view));
         for (&frame, time) in frames.iter().zip(times) {
             if let Some(time) = time.filter(|&time| shown.0 != Some(time)) {
                 // The old view is dropped before the next time is read.
                 shown = (Some(time), None);
-                let volume = input.read_volume(&at_time(&scene, time), outputs)?;
+                let volume = progress.watch(input.read_volume(&at_time(&scene, time), outputs)?);
                 shown.1 = Some(headless.view(volume, &scene).map_err(|error| input.failure(error))?);
             }
             let Some(view) = &mut shown.1 else { continue };

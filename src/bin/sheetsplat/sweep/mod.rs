@@ -149,7 +149,7 @@ fn draw(
 ) -> Result<Vec<Tile>, Failure> {
     let Arguments { input, annotate, .. } = arguments;
     let headless = input.headless(false, scenes.iter().map(|(scene, _)| scene))?;
-    let mut progress = Progress::new(scenes.len(), progress);
+    let progress = Progress::new(scenes.len(), progress);
     let mut last: Option<(Scene, OpenVolume)> = None;
     let mut tiles = Vec::new();
     for (scene, label) in scenes {
@@ -160,7 +160,8 @@ fn draw(
         };
         let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
         let overlay = annotate.overlay(&scene, volume.sample())?;
-        let mut rendering = headless.render_volume(volume.clone(), &scene).map_err(|error| input.failure(error))?;
+        let mut rendering =
+            headless.render_volume(progress.watch(volume.clone()), &scene).map_err(|error| input.failure(error))?;
         log_frame(&label.join(", "), &rendering.stats);
         overlay.draw(&mut rendering.image);
         tiles.push(Tile { image: rendering.image, label });
