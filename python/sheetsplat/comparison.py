@@ -42,7 +42,7 @@ class Comparison:
 
     @property
     def worst(self) -> tuple[int, ...]:
-        """x and y of the pixel with the largest difference."""
+        """The pixel with the largest difference: x and y."""
         return tuple(self._native.worst)
 
     @property

@@ -28,7 +28,9 @@ def public(module: Any) -> Iterator[tuple[str, Any]]:
     names = [*getattr(module, "__all__", []), *(["Golden"] if module.__name__.endswith("pytest_plugin") else [])]
     for name in names:
         value = getattr(module, name)
-        yield name, value
+        if name != "Golden":
+            # Only the fixture makes that one.
+            yield name, value
         if inspect.isclass(value):
             for attribute, member in vars(value).items():
                 if not attribute.startswith("_") or attribute == "__call__":
