@@ -4,6 +4,31 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "BytesRead",
+    "Comparison",
+    "Part",
+    "Scene",
+    "View",
+    "Volume",
+    "check_format",
+    "check_golden",
+    "check_sizes",
+    "compare",
+    "elevation_and_center",
+    "encode",
+    "merge",
+    "open_image",
+    "panned",
+    "pixel",
+    "placed",
+    "presets",
+    "save",
+    "split",
+    "with_camera",
+    "write",
+]
+
 @final
 class BytesRead:
     def __new__(cls) -> BytesRead: ...
@@ -28,7 +53,7 @@ class Volume:
         selection: list[int | None],
         scene: Scene | None,
         bytes_read: BytesRead | None,
-        changes: tuple[tuple[float, float, float] | None, NDArray[Any] | None] = (None, None),
+        changes: tuple[tuple[float, float, float] | None, NDArray[Any] | None] | None = None,
     ) -> Volume: ...
     def replaced(
         self,

@@ -128,7 +128,7 @@ impl Volume {
     /// A volume file, a folder of slices, or `builtin:NAME`: the channel, the time and the level that `selection` states. The scene in which it will be shown
     /// chooses a level that is left open, or the finest is taken. The spacing, in the order z, y, x, and the labels of an array go before the file's.
     #[staticmethod]
-    #[pyo3(signature = (path, memory, selection, scene, bytes_read, changes=(None, None)))]
+    #[pyo3(signature = (path, memory, selection, scene, bytes_read, changes=None))]
     fn open(
         py: Python<'_>,
         path: PathBuf,
@@ -136,10 +136,10 @@ impl Volume {
         selection: [Option<u32>; 3],
         scene: Option<&Scene>,
         bytes_read: Option<&BytesRead>,
-        changes: Changes<'_>,
+        changes: Option<Changes<'_>>,
     ) -> PyResult<Self> {
         let mut options = reading(memory, bytes_read)?;
-        let (spacing, labels) = changes;
+        let (spacing, labels) = changes.unwrap_or_default();
         let labels = labels.map(|labels| read_labels(&labels, 1, options.memory_limit())).transpose()?;
         if let Some((_, labels)) = &labels {
             options.memory = Some(options.memory_limit().saturating_sub(size_of_val(&**labels) as u64));
