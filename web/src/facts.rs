@@ -45,20 +45,18 @@ struct Channel<'a> {
     colormap: Option<&'static str>,
     /// Whether the scene states the colours one by one.
     has_colors: bool,
-    #[serde(flatten)]
-    histogram: &'a Histogram,
+    range: [f64; 2],
+    histogram: &'a [f64],
     /// The transfer function's control points.
     opacity: Vec<(f64, f64)>,
     color: Vec<(f64, [f64; 3])>,
 }
 
 /// The distribution of a channel's values.
-#[derive(Serialize)]
 pub(crate) struct Histogram {
     /// The smallest and the greatest value.
     range: [f64; 2],
     /// Counts of values in equal intervals of the range, which hold equally many integers if all values are.
-    #[serde(rename = "histogram")]
     counts: Vec<f64>,
 }
 
@@ -110,7 +108,8 @@ impl<'a> Channel<'a> {
             visible: settings.as_ref().is_none_or(|settings| settings.visible),
             colormap: stated.and_then(|stated| name_of(&Colormap::ALL, stated.colormap?)),
             has_colors: stated.is_some_and(|stated| stated.color.is_some()),
-            histogram,
+            range: histogram.range,
+            histogram: &histogram.counts,
             opacity: transfer.opacity.points().to_vec(),
             color: transfer.color.points().iter().map(color).collect(),
         }
