@@ -116,6 +116,7 @@ pub mod headless;
 pub mod image;
 mod kernel;
 mod lists;
+mod parallel;
 pub mod part;
 #[cfg(feature = "gpu")]
 mod pass;

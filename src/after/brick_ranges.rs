@@ -7,9 +7,9 @@
 //! change of the transfer function changes.
 
 use glam::UVec3;
-use rayon::prelude::*;
 
 use crate::lists::iso_range::ValueSet;
+use crate::parallel::prelude::*;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Tables, TransferFunction};
 use crate::volume::range::{EMPTY, union};

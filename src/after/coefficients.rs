@@ -8,10 +8,10 @@
 use std::sync::Arc;
 
 use glam::{IVec3, UVec3};
-use rayon::prelude::*;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
+use crate::parallel::prelude::*;
 use crate::volume::{Grid, Volume};
 
 /// The maximum error of the field at the voxels, relative to the values' range; SPEC §9 asks for 1e-5.

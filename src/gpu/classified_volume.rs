@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use glam::UVec3;
-use rayon::prelude::*;
 use wgpu::{Device, Limits, Queue, TextureView};
 
 use crate::after::brick_ranges::{Bearing, BrickRanges};
@@ -18,6 +17,7 @@ use crate::lists::classify::{classify, in_rows, takes_part};
 use crate::lists::iso_range::ValueSet;
 use crate::lists::quad_plan::{Overlaps, tile_grid};
 use crate::lists::value_list::ValueList;
+use crate::parallel::prelude::*;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};

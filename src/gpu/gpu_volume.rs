@@ -3,7 +3,6 @@
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-use rayon::prelude::*;
 use wgpu::{Device, Limits, Queue, TextureView};
 
 use crate::after::coefficients;
@@ -12,6 +11,7 @@ use crate::error::RenderError;
 use crate::gpu::fault::scoped;
 use crate::gpu::volume_texture::{OwnColors, ValueFormat, VolumeTexture};
 use crate::lists::value_list::ValueList;
+use crate::parallel::prelude::*;
 use crate::volume::Volume;
 
 /// A volume and its textures on a device. Clones share the textures.

@@ -219,8 +219,8 @@ pub const FIRST_HIT: Shader = shader!("first_hit", "shared/frame", "shared/cut")
 /// Composites the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "shared/frame", "shared/band");
 
-/// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 18] = [
+/// Every shader, in the order of the data flow. A page has none of tiles, for which browsers lack what they need.
+pub const ALL: &[Shader] = &[
     CULL_BRICKS,
     CULL_VOXELS,
     COMPACT,
@@ -235,7 +235,9 @@ pub const ALL: [Shader; 18] = [
     FIELD,
     CLASSIFY,
     OCCLUDE,
+    #[cfg(not(target_arch = "wasm32"))]
     GATHER,
+    #[cfg(not(target_arch = "wasm32"))]
     GATHER_PLANES,
     FIRST_HIT,
     RESOLVE,
@@ -244,7 +246,7 @@ pub const ALL: [Shader; 18] = [
 impl Shader {
     /// Whether workgroup memory must be zeroed. The tile rasterizer's memory is large, and it writes everything before reading it.
     pub fn needs_zeroed_memory(&self) -> bool {
-        *self != GATHER && *self != GATHER_PLANES
+        !self.stage.starts_with("gather")
     }
 
     /// The complete WGSL.

@@ -1,12 +1,12 @@
 //! The volume's values, labels and colours on the GPU, as texture arrays, whose size is not limited by one binding. Layers have 2048 texels a side, or
 //! 4096 or 8192 if a volume would need more layers than the device has; with WebGPU's default limits 2048 suffice.
 
-use rayon::prelude::*;
 use wgpu::{
     Device, Extent3d, Limits, Queue, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
 };
 
 use crate::error::RenderError;
+use crate::parallel::prelude::*;
 use crate::volume::Texel;
 
 /// The smallest of [`SIDES`].

@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use glam::DVec4;
-use rayon::prelude::*;
 
 use crate::geometry::slab::{self, SlabGrid};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 use crate::lists::bucket::Buckets;
+use crate::parallel::prelude::*;
 use crate::settings::splatting::Order;
 
 /// The side of a tile in pixels (§6).

@@ -12,6 +12,9 @@ use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Me
 /// The subgroup sizes that tiles support.
 const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=64;
 
+/// Whether tiles are compiled in: browsers have no barriers for subgroups, and a page's code must be short.
+pub(crate) const HAS_TILES: bool = cfg!(not(target_arch = "wasm32"));
+
 /// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RasterizerKind {
@@ -83,7 +86,7 @@ fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
 
 /// Why a device does not support tiles; `None` if it does.
 fn obstacle_in_device(device: &Device) -> Option<RenderError> {
-    if !device.features().contains(TILE_FEATURES) {
+    if !HAS_TILES || !device.features().contains(TILE_FEATURES) {
         return refused_tiles("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
     }
     let info = device.adapter_info();

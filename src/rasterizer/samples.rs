@@ -2,7 +2,6 @@
 //! colours of hidden voxels bleed, as the paper says.
 
 use glam::{DVec2, UVec3};
-use rayon::prelude::*;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
 use super::{Footprints, FrameEstimate, FrameInputs, Prepared, compute};
@@ -17,6 +16,7 @@ use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::lists::brick::{self, BRICK_VOXELS};
 use crate::lists::quad_plan::tile_grid;
+use crate::parallel::prelude::*;
 use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};

@@ -27,7 +27,7 @@ use crate::pass::first_hit::FirstHit;
 use crate::pass::resolve::Resolve;
 use crate::rasterizer::FrameInputs;
 use crate::rasterizer::fields::FieldRasterizer;
-use crate::rasterizer::kind::RasterizerKind;
+use crate::rasterizer::kind::{HAS_TILES, RasterizerKind};
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
@@ -128,14 +128,14 @@ impl Renderer {
         let lists = settled.lists();
         let by_label = view.volume.shades_by_label();
         let tiles = match request.kind {
-            RasterizerKind::Tiles { insisted } => {
+            RasterizerKind::Tiles { insisted } if HAS_TILES => {
                 let bricks = (settled.all(), lists.len());
                 match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
                     Err(error) if insisted => return Err(error),
                     needs => needs.ok(),
                 }
             }
-            RasterizerKind::Quads | RasterizerKind::Samples => None,
+            _ => None,
         };
         let needs = match (tiles, request.kind, &request.after) {
             (Some(needs), ..) => needs,
@@ -281,7 +281,9 @@ impl Renderer {
             return Ok((Drawing::Samples(Box::new(frame)), prepared, None));
         }
         let mut fallback = None;
-        if let RasterizerKind::Tiles { insisted } = kind {
+        if let RasterizerKind::Tiles { insisted } = kind
+            && HAS_TILES
+        {
             match self.tiles.prepare(inputs, old_tiles) {
                 Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared, None)),
                 Err(error) if insisted => return Err(error),

@@ -60,7 +60,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
-use rayon::prelude::*;
 
 pub(crate) use access::Access;
 pub use access::ReadOptions;
@@ -87,6 +86,7 @@ pub use streamed::StreamedVolume;
 
 use crate::error::setting::SettingError;
 pub use crate::error::volume::VolumeError;
+use crate::parallel::prelude::*;
 use crate::stats::StoreCounts;
 
 /// How a file stores a volume.

@@ -4,10 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
-use rayon::prelude::*;
 
 use super::access::Access;
 use super::{Orientation, Texel, Volume, VolumeError, invalid};
+use crate::parallel::prelude::*;
 
 /// Places that differ by less, in voxels, are the same.
 const SAME_PLACE: f64 = 1e-4;

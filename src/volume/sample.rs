@@ -1,9 +1,9 @@
 //! Samples of stores: as many values as fit into memory, from which histograms, presets and the camera's frame are taken.
 
 use glam::{DVec3, UVec3};
-use rayon::prelude::*;
 
 use super::{Grid, Store, StoreLevel, Volume, VolumeError, invalid, punch_holes};
+use crate::parallel::prelude::*;
 
 /// Reads a sample of a store's values, which takes at most `memory` bytes: the finest level that fits, or else every nth voxel along each axis of the
 /// coarsest level. The sample's voxels lie where they do in the store. `origin` names the store in errors.

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::classify::{Slab, mask};
 use super::frame::Frame;
@@ -15,6 +14,7 @@ use crate::after::coefficients;
 use crate::cpu::count::bits;
 use crate::cpu::vector::LANES;
 use crate::error::RenderError;
+use crate::parallel::prelude::*;
 use crate::settings::splatting::Interpolation;
 use crate::volume::{Texel, Volume};
 

@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::extreme::is_choice;
 use super::field::Field;
@@ -29,6 +28,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::tile_grid;
+use crate::parallel::prelude::*;
 use crate::part::Resolver;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;

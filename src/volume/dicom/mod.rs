@@ -16,7 +16,6 @@ mod series;
 use std::path::{Path, PathBuf};
 
 use glam::DMat3;
-use rayon::prelude::*;
 
 use self::image::Image;
 use self::series::Series;
@@ -27,6 +26,8 @@ use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::{SIZES, Samples, Voxel, dims_of};
 use super::series::apart;
 use super::source::invalid;
+use crate::parallel;
+use crate::parallel::prelude::*;
 
 /// Reads the frames of one file.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
@@ -64,7 +65,7 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
     Samples { kind, dims, big_endian: false, rescale: None, z_fastest: false }.reserve::<T>(path, access)?;
     let mut values = Vec::new();
     // One slice per thread at a time, because codecs are slow.
-    for slices in slices.chunks(rayon::current_num_threads()) {
+    for slices in slices.chunks(parallel::current_num_threads()) {
         let frames: Vec<_> = slices.par_iter().map(|slice| images[slice.image].frame(slice.frame, access)).collect();
         for (slice, frame) in slices.iter().zip(frames) {
             let image = &images[slice.image];
