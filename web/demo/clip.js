@@ -7,6 +7,11 @@ const AXES = ["x", "y", "z"];
 const BEYOND = 10;
 const DEGREES = 180 / Math.PI;
 
+/** Whether a side is at the end of its slider, whose steps are rounded. */
+function isAtEnd(side, half) {
+    return Math.abs(side) >= 0.999 * half;
+}
+
 export class Clip {
     #change;
     #view;
@@ -89,16 +94,15 @@ export class Clip {
     #crop() {
         const ends = (end) => this.#sliders().filter((slider) => slider.dataset.end === end).map((slider) => Number(slider.value));
         const [low, high] = [ends("from"), ends("to")];
-        const isWhole = this.#half.every((half, axis) => low[axis] <= -half && high[axis] >= half);
-        if (isWhole) {
+        if (this.#half.every((half, axis) => low[axis] < 0 && isAtEnd(low[axis], half) && high[axis] > 0 && isAtEnd(high[axis], half))) {
             this.#change({ "clip.crop": null });
             return;
         }
         // Sliders that have passed each other keep what is between them; an empty box is refused, so a hair is kept.
         const crop = this.#half.map((half, axis) => {
             const [from, to] = [Math.min(low[axis], high[axis]), Math.max(low[axis], high[axis])];
-            const begin = from <= -half ? -BEYOND * half : from;
-            return [begin, Math.max(to >= half ? BEYOND * half : to, begin + 1e-4 * half)];
+            const begin = from < 0 && isAtEnd(from, half) ? -BEYOND * half : from;
+            return [begin, Math.max(to > 0 && isAtEnd(to, half) ? BEYOND * half : to, begin + 1e-4 * half)];
         });
         this.#change({ "clip.crop": [crop.map(([from]) => from), crop.map(([, to]) => to)] });
     }

@@ -113,6 +113,7 @@ test("every control changes the picture, and a saved scene shows it again", asyn
         await shown.keyboard.press("Shift+ArrowUp");
     });
     await changes("a point that is dragged", async () => {
+        await shown.locator("#plot circle").last().scrollIntoViewIfNeeded();
         const box = await shown.locator("#plot circle").last().boundingBox();
         const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
         const label = await shown.locator("#plot circle").last().getAttribute("aria-label");
