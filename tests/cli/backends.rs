@@ -121,7 +121,7 @@ fn without_a_loader_the_first_command_draws() {
         folder.write(&format!("no-loader/{name}"), "");
     }
     let library = folder.path("no-loader").into_os_string().into_string().unwrap();
-    let mut without_loader = |arguments: &str| {
+    let without_loader = |arguments: &str| {
         let environment = [("LD_LIBRARY_PATH", library.as_str())];
         let mut command = folder.command(arguments);
         command.env_remove("WGPU_ADAPTER_NAME").env_remove("SHEETSPLAT_BACKEND").env_remove("SHEETSPLAT_SIMD");

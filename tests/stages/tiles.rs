@@ -169,8 +169,8 @@ fn lists_of_planes_are_those_of_the_rules() {
     let mut behind = 0;
     for case in 0..24 {
         let size: [u32; 2] = sizes[case % sizes.len()];
-        let mut case = Case::random(&mut random, size, [random.bits() as u32 % 40, 3]);
-        case.culling &= case.reach[0] < size[0];
+        let reach = [random.bits() as u32 % 40, 3];
+        let mut case = Case::random(&mut random, size, reach);
         let order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
         let last = (0..case.touched.len()).map(|_| random.pick(&[0, NUMBER - 2, NUMBER - 1, NUMBER, NUMBER + 1]));
         case.planes = Some((last.collect(), order));
