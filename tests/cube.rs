@@ -82,7 +82,7 @@ fn the_cube_does_not_pop() {
         drawn.into_iter().chain([twin]).collect::<Vec<_>>()
     };
     for (name, Turned { rms, ratio }) in by_all(&scene) {
-        assert_at_most(rms, 0.003, name);
+        assert_at_most(rms, 0.003, &name);
         // Along the flatter of two rays more of the lit layer lies before the dark inside, which reduces the ratio slightly.
         assert!(1.0 < ratio && ratio < cosines, "{name}: {ratio}");
     }
@@ -94,7 +94,7 @@ fn the_cube_does_not_pop() {
     scene.splatting.method = Method::ImageAligned;
     scene.splatting.compositing = Compositing::Exponential;
     for (name, Turned { rms, ratio }) in by_all(&scene) {
-        assert_at_most(rms, 0.00165, name);
+        assert_at_most(rms, 0.00165, &name);
         assert!(1.0027 < ratio && ratio < cosines, "{name}: {ratio}");
     }
     // A lit layer that hides everything behind it.

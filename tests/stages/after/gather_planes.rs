@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec4;
+use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::gpu::gathered_layout::GatheredLayout;
 use sheetsplat::internals::gpu::layout::{Gathered, PatchRange, Tally};
 use sheetsplat::internals::gpu::targets::no_surfaces;
@@ -36,7 +37,11 @@ struct Drawn {
 
 /// Draws the whole image over an empty buffer, in bands of at most `band_rows` rows.
 fn gathered(prepared: &Prepared<'_>, stage: &Gather, first_hit: Option<f64>, band_rows: u32) -> Drawn {
-    let Prepared { gpu, view, volume, scene, bricks, .. } = prepared;
+    let Prepared { gpu, view, volume, scene, .. } = prepared;
+    // The stage gets no holes.
+    let voxels: Vec<u32> = (0..).zip(volume.values()).filter(|(_, value)| !value.is_nan()).map(|(at, _)| at).collect();
+    let list = BrickList::new(volume.grid(), &voxels);
+    let bricks = list.bricks();
     let (device, queue, size, splatting) = (gpu.device(), gpu.queue(), view.size, &scene.splatting);
     let kernel = Kernel::new(splatting.radius, splatting.falloff);
     let geometry = PlaneGeometry::new(view, volume.grid());
