@@ -1,6 +1,7 @@
 //! Small pictures of the builtin volumes, compared with those in `tests/goldens`.
 //!
-//! The native backend makes them, and draws every byte of them again on any machine. Each rasterizer on Mesa's lavapipe is held to them with a tolerance:
+//! The native backend makes them, and draws every byte of them again on any machine, with every instruction set that it has (or with the one that
+//! `SHEETSPLAT_SIMD` names). Each rasterizer on Mesa's lavapipe is held to them with a tolerance:
 //! f32 sums are taken in other orders there, and lavapipe's approximate reciprocals differ between processors. A failing picture and its
 //! differences are left in `target/goldens`. `SHEETSPLAT_BLESS=all`, or the names of scenes separated by commas, rewrites the goldens that fail, and only those.
 #![cfg(all(feature = "golden", feature = "cpu"))]
@@ -8,8 +9,9 @@
 
 use std::path::{Path, PathBuf};
 
+use sheetsplat::cpu::{CpuRenderer, Simd};
 use sheetsplat::golden;
-use sheetsplat::golden::{Bless, Picture, Tolerance};
+use sheetsplat::golden::{Bless, Comparison, Picture, Tolerance};
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::Classification;
@@ -359,6 +361,33 @@ fn the_native_backend_draws_the_goldens_byte_by_byte() {
     };
     let complaints: Vec<String> = SCENES.into_iter().filter_map(check).collect();
     assert!(complaints.is_empty(), "{}", complaints.join("\n\n"));
+}
+
+/// If the environment names an instruction set, that one; under an emulator the others would take long.
+#[test]
+fn every_instruction_set_draws_the_goldens_byte_by_byte() {
+    let named = std::env::var_os("SHEETSPLAT_SIMD");
+    let levels: Vec<Simd> = (Simd::available().into_iter())
+        .filter(|level| named.as_ref().is_none_or(|name| name == level.name()))
+        .collect();
+    assert!(levels.len() >= if named.is_some() { 1 } else { 2 }, "only {levels:?}");
+    let mut complaints = Vec::new();
+    for row in SCENES {
+        let scene = scene(row);
+        let volume = scene.load_volume().unwrap();
+        let mut renderer = CpuRenderer::new(volume, &scene).unwrap();
+        let golden = Picture::open(&golden!(row.0).unwrap().path()).unwrap().image;
+        for &level in &levels {
+            renderer.set_simd(level).unwrap();
+            let rendering = renderer.draw().unwrap();
+            assert_eq!(rendering.stats.driver, level.name(), "{}", row.0);
+            let comparison = Comparison::new(&rendering.image, &golden, Tolerance::EXACT).unwrap();
+            if !comparison.passes() {
+                complaints.push(format!("{} with {}: {comparison}", row.0, level.name()));
+            }
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
 
 #[test]

@@ -77,6 +77,12 @@ impl BrickRanges {
         Self { grid: *grid, ranges: along_z }
     }
 
+    /// Where they lie in memory.
+    #[cfg(test)]
+    pub(crate) fn place(&self) -> *const () {
+        self.ranges.as_ptr().cast()
+    }
+
     /// Whether each brick may be drawn.
     pub fn shown(&self, volume: &Volume, transfer: &TransferFunction, bearing: Bearing) -> Vec<bool> {
         let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();

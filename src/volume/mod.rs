@@ -332,7 +332,7 @@ impl Volume {
     pub(crate) fn coefficients<E>(
         &self,
         kernel: (f64, f64),
-        compute: impl FnOnce() -> Result<Vec<f32>, E>,
+        compute: impl FnOnce() -> Result<Arc<[f32]>, E>,
     ) -> Result<Arc<[f32]>, E> {
         self.coefficients.get_or_compute(kernel, compute)
     }

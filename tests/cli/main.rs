@@ -169,6 +169,9 @@ const QUADS: &str = "--set splatting.rasterizer=quads";
 const TILES: &str = "--set splatting.rasterizer=tiles";
 const RASTERIZERS: [&str; 2] = [QUADS, TILES];
 
+/// Whatever draws, beside the reference backend.
+const DRAWINGS: [&str; 3] = [QUADS, TILES, "--backend cpu"];
+
 /// The reference backend culls nothing.
 const UNCULLED: &str = "--set splatting.culling=false";
 

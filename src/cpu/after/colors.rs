@@ -58,8 +58,11 @@ impl Colors {
                 if value.is_nan() { f32::NAN } else { share(texel[component]) }
             };
             let numbers: Vec<f32> = texels.par_iter().zip(values).map(own).collect();
-            let exact = coefficients::exact(volume.grid(), &numbers, kernel, &|_| {})?;
-            colors.par_iter_mut().zip(exact).for_each(|(color, number)| color[component] = number);
+            let exact = coefficients::solved(volume.grid(), &numbers, kernel, &|share| {
+                let percent = 25.0 * (component as f64 + share);
+                log::info!(target: coefficients::PROGRESS, "coefficients of the voxels' colours: {percent:.0} %");
+            })?;
+            colors.par_iter_mut().zip(exact.par_iter()).for_each(|(color, &number)| color[component] = number);
         }
         Ok(Some(Self::Exact(colors.into())))
     }
