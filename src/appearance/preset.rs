@@ -87,6 +87,11 @@ impl Preset {
         !matches!(self, Self::Xray | Self::Mip | Self::Confocal | Self::Labels | Self::Fusion)
     }
 
+    /// Whether a label map among several channels keeps its labels' colours: not in projections, which add up or compare amounts.
+    pub(crate) fn keeps_labels(self) -> bool {
+        !matches!(self, Self::Xray | Self::Mip)
+    }
+
     /// The transfer function for a volume. Those for CT are in Hounsfield units: the values themselves if one in a thousand is below -100;
     /// or else the values less 1024 if the maximum lies within 1500 to 8191; or else a scale on which the background (by Otsu's threshold)
     /// is air, -1000, and the faintest eighth of the rest is water, 0. Without labels in the volume, [`Self::Labels`] gives
@@ -169,6 +174,11 @@ fn hot(volume: &Volume, object: &Object) -> TransferFunction {
     let opacity = Ramp::through(vec![(object.threshold(), 0.0), (object.bright, 0.25)]);
     let glow = TransferFunction::by_value(Ramp::through(vec![(object.background, DVec3::ONE)]), opacity);
     TransferFunction { color: Colormap::Hot.of(volume, &glow).unwrap_or(glow.color.clone()), ..glow }
+}
+
+/// The opacity of labels over a first channel that is to be seen too: every label but 0.
+pub(super) fn translucent_labels() -> Ramp<f64> {
+    Ramp::through(vec![(0.0, 0.0), (1.0, 0.3)])
 }
 
 /// White, with an opacity that rises from the background to a value that few voxels exceed.
