@@ -32,7 +32,7 @@ pub enum Preset {
     Confocal,
     /// Labels: one colour each; see [`categories`].
     Labels,
-    /// Several channels (SPEC §10): the first gray and solid, such as CT, the others hot and translucent, such as PET.
+    /// Several channels (SPEC §10): the first gray, such as CT, with a surface that lets the others through, which are hot and translucent, such as PET.
     Fusion,
     /// A volume of colours (SPEC §10), such as photographed slices: opaque, in these colours. Other volumes are gray.
     Photo,
@@ -124,7 +124,8 @@ impl Preset {
             Self::Mip => Object::find(values).map_or_else(|| constant(0.5), |object| mip(values, &object)),
             Self::Confocal => confocal(volume),
             Self::Labels => labels(volume).unwrap_or_else(|| TransferFunction::from_histogram(volume)),
-            Self::Fusion | Self::Photo => Object::find(values).map_or_else(|| constant(0.5), |object| solid(&object)),
+            Self::Fusion => Object::find(values).map_or_else(|| constant(0.1), |object| glass(volume, &object)),
+            Self::Photo => Object::find(values).map_or_else(|| constant(0.5), |object| solid(&object)),
         }
     }
 
@@ -167,6 +168,23 @@ fn solid(object: &Object) -> TransferFunction {
     let color =
         vec![(object.threshold(), DVec3::splat(0.55)), (bright.max(2.0 * faint - object.threshold()), DVec3::ONE)];
     TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
+}
+
+/// Gray like glass, so that what glows within is seen: a surface, little between it and what is bright, such as bone, and that denser again.
+fn glass(volume: &Volume, object: &Object) -> TransferFunction {
+    /// Opacities times the volume's mean extent, so that volumes of any resolution let as much through.
+    const DEPTHS: [f64; 3] = [16.0, 0.5, 8.0];
+    const MOST: f64 = 0.25;
+    let extent = (volume.dims().as_dvec3() * volume.grid().aspect()).element_sum() / 3.0;
+    let [surface, inside, bright] = DEPTHS.map(|depth| (depth / extent).min(MOST));
+    let threshold = object.threshold();
+    let opacity = vec![
+        (threshold - (threshold - object.background) / 3.0, 0.0),
+        (threshold, surface),
+        (object.bright, inside),
+        (object.bright + (object.bright - threshold) / 2.0, bright),
+    ];
+    TransferFunction { opacity: Ramp::through(opacity), ..solid(object) }
 }
 
 /// A glow that is hotter, and denser, where values are greater.
