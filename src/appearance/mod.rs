@@ -37,7 +37,7 @@ impl TransferFunction {
 pub(crate) fn one_of_several(volume: &Volume) -> TransferFunction {
     match volume.colors() {
         Some(_) => TransferFunction::from_histogram(volume),
-        None => preset::confocal(volume),
+        None => preset::confocal_of_several(volume),
     }
 }
 

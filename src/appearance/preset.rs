@@ -1,6 +1,7 @@
 //! Presets: a transfer function for a kind of data, with matching shading and compositing.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::colormap::Colormap;
 use super::hounsfield::Hounsfield;
@@ -170,20 +171,22 @@ fn solid(object: &Object) -> TransferFunction {
     TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
 }
 
-/// Gray like glass, so that what glows within is seen: a surface, little between it and what is bright, such as bone, and that denser again.
+/// Gray like glass, so that what glows within is seen: a surface, little in most of the object, and what is brighter, such as bone, denser again.
 fn glass(volume: &Volume, object: &Object) -> TransferFunction {
     /// Opacities times the volume's mean extent, so that volumes of any resolution let as much through.
     const DEPTHS: [f64; 3] = [16.0, 0.5, 8.0];
     const MOST: f64 = 0.25;
-    let extent = (volume.dims().as_dvec3() * volume.grid().aspect()).element_sum() / 3.0;
-    let [surface, inside, bright] = DEPTHS.map(|depth| (depth / extent).min(MOST));
+    let [surface, inside, bright] = DEPTHS.map(|depth| (depth / extent(volume)).min(MOST));
     let threshold = object.threshold();
-    let opacity = vec![
+    let mut opacity = vec![
         (threshold - (threshold - object.background) / 3.0, 0.0),
         (threshold, surface),
+        (object.faint, inside),
         (object.bright, inside),
         (object.bright + (object.bright - threshold) / 2.0, bright),
     ];
+    // In homogeneous matter the two are one.
+    opacity.dedup_by_key(|point| point.0);
     TransferFunction { opacity: Ramp::through(opacity), ..solid(object) }
 }
 
@@ -211,7 +214,32 @@ fn mip(values: &[f32], object: &Object) -> TransferFunction {
 
 /// A haze over the window that the volume's file states, or else from the background to the brightest eighth of the object; in the file's colours,
 /// or else green.
-pub(super) fn confocal(volume: &Volume) -> TransferFunction {
+fn confocal(volume: &Volume) -> TransferFunction {
+    haze(volume, |_| 0.5)
+}
+
+/// The same for one of several channels, so thin that one lets others behind it through: the mean ray through the volume meets an
+/// optical depth of `DEPTH`.
+pub(super) fn confocal_of_several(volume: &Volume) -> TransferFunction {
+    const DEPTH: f64 = 0.4;
+    const MOST: f64 = 0.5;
+    // Whole numbers, whose sum does not depend on their order.
+    const STEPS: f64 = 65536.0;
+    haze(volume, |[start, top]| {
+        let share = |value: f32| ((f64::from(value) - start) / (top - start)).clamp(0.0, 1.0);
+        let sum: u64 = volume.values().par_iter().map(|&value| (share(value) * STEPS) as u64).sum();
+        let mean = sum as f64 / STEPS / volume.values().len() as f64;
+        (DEPTH / (mean * extent(volume))).min(MOST)
+    })
+}
+
+/// The mean of a volume's sides, in its smallest spacing.
+fn extent(volume: &Volume) -> f64 {
+    (volume.dims().as_dvec3() * volume.grid().aspect()).element_sum() / 3.0
+}
+
+/// [`confocal`] with the opacity at a window's end.
+fn haze(volume: &Volume, opacity: impl Fn([f64; 2]) -> f64) -> TransferFunction {
     let (object, display) = (Object::find(volume.values()), volume.display());
     let around = |object: &Object| [(object.background + object.threshold()) / 2.0, object.bright];
     let window = display.and_then(|display| display.window).or(object.as_ref().map(around));
@@ -219,7 +247,7 @@ pub(super) fn confocal(volume: &Volume) -> TransferFunction {
     let dark = object.map_or(start, |object| object.background).min(start);
     let green = || Ramp::through(vec![(dark, DVec3::new(0.0, 0.35, 0.05)), (top, DVec3::new(0.55, 1.0, 0.6))]);
     let color = display.and_then(channel_display::color).unwrap_or_else(green);
-    TransferFunction::by_value(color, Ramp::through(vec![(start, 0.0), (top, 0.5)]))
+    TransferFunction::by_value(color, Ramp::through(vec![(start, 0.0), (top, opacity([start, top]))]))
 }
 
 fn labels(volume: &Volume) -> Option<TransferFunction> {

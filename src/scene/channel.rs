@@ -123,9 +123,9 @@ impl Scene {
             && categories::is_label_map(channel);
         let chosen = |preset: Option<Preset>| match preset {
             _ if shows_labels => labels_of_several(channel, preset),
+            None | Some(Preset::Confocal) => one_of_several(channel),
             Some(preset) if number > 0 => preset.transfer_of_further(channel),
             Some(preset) => preset.transfer(channel),
-            None => one_of_several(channel),
         };
         let keeps_color = shows_labels || matches!(settings.preset, Some(Preset::Fusion | Preset::Labels));
         if has_color || keeps_color {
@@ -140,9 +140,13 @@ impl Scene {
     pub(super) fn explicit_channels(&self, volume: &Volume) -> Vec<Channel> {
         let channel = |(number, channel): (usize, &Volume)| {
             let settings = self.settings_of(number).into_owned();
-            let source = if number < 1 + self.further.len() { settings.volume } else { VolumeSource::Memory };
+            // A channel without a table is one of the first one's volume, which only that one's table describes.
+            let settings = match number <= self.further.len() {
+                true => settings,
+                false => Channel { visible: settings.visible, ..Channel::new(VolumeSource::Memory) },
+            };
             let name = settings.name.or_else(|| channel.channel_name().map(str::to_owned));
-            Channel { name, volume: source, transfer: self.transfer_of(number, volume, channel).into(), ..settings }
+            Channel { name, transfer: self.transfer_of(number, volume, channel).into(), ..settings }
         };
         (0..).zip(volume.channels()).map(channel).collect()
     }

@@ -146,7 +146,10 @@ fn picks_name_the_channel() {
 fn the_preset_fusion_shows_both() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = phantom(folder.path(), DVec3::ZERO);
-    // A glow in the middle of the solid ball.
+    // A ball with an edge as soft as scanners give, and a glow in its middle.
+    let ball =
+        |place: DVec3| (100.0 + 300.0 * (7.0 - place.distance(DVec3::new(10.0, 12.0, 8.0)))).clamp(-1000.0, 100.0);
+    write(&folder.path().join("ct.nrrd"), UVec3::new(21, 25, 17), (DVec3::ZERO, DVec3::AXES), ball);
     let steps = DVec3::AXES.map(|axis| axis * 2.0);
     let glow = |place: DVec3| 8.0 * (-place.distance_squared(DVec3::new(10.0, 12.0, 8.0)) / 12.0).exp();
     write(&folder.path().join("pet.nrrd"), UVec3::new(11, 13, 9), (DVec3::ZERO, steps), glow);
