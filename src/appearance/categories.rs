@@ -46,7 +46,7 @@ pub fn is_label_map(volume: &Volume) -> bool {
         return false;
     }
     let Some(counts) = counts(volume) else { return false };
-    if volume.labels().is_none() && !volume.label_names().is_empty() {
+    if volume.is_known_label_map() {
         return true;
     }
     if counts.len() < 3 {

@@ -76,6 +76,7 @@ pub use labels::Labels;
 use loaded::{Levels, Loaded};
 pub use orientation::{Orientation, PatientSide};
 pub use raw::RawLayout;
+pub(crate) use resample::Resampling;
 pub use sample::sample;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
@@ -125,6 +126,8 @@ pub struct Volume {
     colors: Option<Arc<[Texel]>>,
     labels: Option<Arc<[u16]>>,
     label_names: BTreeMap<u16, String>,
+    /// Whether the values are known to be labels.
+    is_label_map: bool,
     orientation: Option<Orientation>,
     unit: Option<String>,
     encoding: Option<Encoding>,
@@ -186,6 +189,7 @@ impl Volume {
             colors: None,
             labels: None,
             label_names: BTreeMap::new(),
+            is_label_map: false,
             orientation: None,
             unit: None,
             encoding: None,

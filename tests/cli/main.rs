@@ -5,6 +5,7 @@
 mod annotations;
 mod backends;
 mod bench;
+mod channels;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;

@@ -11,6 +11,7 @@ mod codecs;
 mod dataset;
 mod elements;
 mod image;
+mod palette;
 mod series;
 
 use std::path::{Path, PathBuf};
@@ -84,6 +85,12 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
     let origin = RAS_FROM_LPS * slices[0].position;
     let orientation = Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * lattice.axes, origin });
     let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
-    let loaded = Loaded { spacing, unit, orientation, series, ..Loaded::new(dims, kind, values) };
+    let is_rescaled = slices.iter().any(|slice| slice.rescale != [1.0, 0.0]);
+    let is_shared = images.iter().all(|image| image.palette == first.palette);
+    if first.palette.is_some() && (is_rescaled || !is_shared) {
+        log::warn!("{}: palettes differ, or indices are rescaled: no colour map is offered", path.display());
+    }
+    let palette = first.palette.clone().filter(|_| is_shared && !is_rescaled);
+    let loaded = Loaded { spacing, unit, orientation, palette, series, ..Loaded::new(dims, kind, values) };
     lattice.straighten(path, series::POSITION, loaded, access)
 }
