@@ -47,8 +47,8 @@ impl Totals {
     }
 }
 
-/// A frame's counts in GPU memory: a [`Tally`](crate::gpu::layout::Tally), the number of composited tiles per group (`[u32]`), and
-/// timestamps from `timestamps` on.
+/// A frame's counts in GPU memory: for every layer a [`Tally`](crate::gpu::layout::Tally) and the number of composited tiles per group
+/// (`[u32]`), and timestamps from `timestamps` on.
 #[derive(Debug)]
 pub(crate) struct Staging {
     pub(crate) buffer: Buffer,
@@ -59,17 +59,23 @@ pub(crate) struct Staging {
     pub(crate) period: f32,
 }
 
+/// The bytes of a layer's counts with a number of groups.
+pub(crate) fn count_bytes(groups: usize) -> u64 {
+    size_of::<Tally>() as u64 + groups as u64 * 4
+}
+
 /// A frame's counts that are being read back from the GPU.
 #[derive(Debug)]
 pub struct PendingCounts {
-    totals: Totals,
+    /// Those of every layer.
+    totals: Vec<Totals>,
     staging: Staging,
     arrival: Receiver<Result<(), BufferAsyncError>>,
 }
 
 impl PendingCounts {
     /// Requests the contents of `staging` once the submitted work is done.
-    pub(crate) fn new(totals: Totals, staging: Staging) -> Self {
+    pub(crate) fn new(totals: Vec<Totals>, staging: Staging) -> Self {
         let (sender, arrival) = channel();
         staging.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
             // The receiver may have been dropped.
@@ -90,9 +96,16 @@ impl PendingCounts {
             let Staging { buffer, timestamps, stages, period } = &self.staging;
             let bytes = buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
             let (counts, times) = bytes.split_at(*timestamps as usize);
-            let (tally, tiles) = counts.split_at(size_of::<Tally>());
-            let tally = bytemuck::pod_read_unaligned(tally);
-            let counts = self.totals.count(&tally, &bytemuck::pod_collect_to_vec(tiles));
+            let mut rest = counts;
+            let mut of_layer = |totals: &Totals| {
+                let (own, others) = rest.split_at(count_bytes(totals.group_sheets.len()) as usize);
+                let (tally, tiles) = own.split_at(size_of::<Tally>());
+                rest = others;
+                totals.count(&bytemuck::pod_read_unaligned(tally), &bytemuck::pod_collect_to_vec(tiles))
+            };
+            let mut layers = self.totals.iter();
+            let mut counts = layers.next().map(&mut of_layer).unwrap_or_default();
+            layers.for_each(|totals| counts.add_channel(&of_layer(totals)));
             Ok((counts, stage_ms(stages, &bytemuck::pod_collect_to_vec(times), *period)))
         }))
     }

@@ -74,6 +74,8 @@ fn classified(prepared: &Prepared<'_>, twin: &Frame<'_>) -> Vec<DVec4> {
         gradient: Gradient::Differences,
         labels: labels.is_some(),
         holes: prepared.has_holes(),
+        channels: 1,
+        own_colors: false,
     };
     let pixels = (size[0] * size[1]) as usize;
     let carried = init(device, &vec![0_u8; pixels * CARRIED_BYTES as usize], BufferUsages::STORAGE);
