@@ -11,25 +11,25 @@ use crate::stats::{Counts, StageTimes};
 
 /// The slabs that a frame's sheet groups consist of.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GroupSlabs {
+pub(crate) struct GroupSlabs {
     /// Every group's first slab, in compositing order.
-    pub firsts: Vec<i32>,
+    pub(crate) firsts: Vec<i32>,
     /// The number of sheets in a group.
-    pub sheets: u32,
+    pub(crate) sheets: u32,
 }
 
 /// The counts of a frame that are known before it is drawn.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Totals {
+pub(crate) struct Totals {
     /// The totals; 0 for counts that only the GPU knows.
-    pub counts: Counts,
+    pub(crate) counts: Counts,
     /// For every sheet group, the number of its sheets that any kernel touches.
-    pub group_sheets: Vec<u64>,
+    pub(crate) group_sheets: Vec<u64>,
 }
 
 impl Totals {
     /// The counts of a drawn frame, from its tally and the number of tiles that each group composited.
-    pub fn count(&self, tally: &Tally, tiles: &[u32]) -> Counts {
+    pub(crate) fn count(&self, tally: &Tally, tiles: &[u32]) -> Counts {
         Counts {
             voxels_shaded: tally.voxels_shaded.into(),
             sections_rasterized: tally.sections_rasterized.into(),

@@ -16,7 +16,7 @@ pub(crate) mod placement;
 pub mod ramps;
 pub mod render_pipeline;
 pub mod shaders;
-mod shown_bricks;
+pub(crate) mod shown_bricks;
 pub mod targets;
 pub mod timer;
 pub mod uniforms;

@@ -45,7 +45,7 @@ const JOIN_WORKGROUP: u32 = 256;
 
 impl JoinMode {
     /// The mode for images with or without first hits.
-    pub fn of(joining: Joining, first_hit: bool) -> Self {
+    pub(crate) fn of(joining: Joining, first_hit: bool) -> Self {
         Self { nearest: joining == Joining::Nearest, first_hit }
     }
 }

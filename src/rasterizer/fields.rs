@@ -166,7 +166,7 @@ impl FieldRasterizer {
         let mut old = old.into_iter().map(|old| old.planes);
         let per_plane = field::SHEETS_PER_PLANE;
         let mut color_layers = request.stored.len() as u32 * per_plane..;
-        let prepare = |(channel, stored): (usize, &Stored)| {
+        let prepare = |(channel, stored): (usize, &Stored)| -> Result<PreparedChannel, RenderError> {
             let planes = request.planes(after, channel, volume.gpu_volume().value_format());
             let bytes = bytemuck::bytes_of(&planes);
             let layers = channel as u32 * per_plane..(channel as u32 + 1) * per_plane;
@@ -287,7 +287,7 @@ impl FieldRasterizer {
 
             for (number, channel) in frame.channels.iter().enumerate() {
                 let clear = (&frame.clear_group, &tile_lists.composited);
-                let of_channel = || lists.iter().filter(|(list, _)| list.channel == number);
+                let of_channel = || lists.iter().filter(move |(list, _)| list.channel == number);
                 let draws = of_channel().map(|(list, offset)| (&list.field_group, *offset, &list.cull.draw_args));
                 let times = timer.as_mut().map(|timer| timer.render("field"));
                 self.field.record(encoder, times, frame.gradient, &channel.sheets, clear, draws);
