@@ -13,7 +13,7 @@ use glam::{IVec3, UVec3};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::parallel::prelude::*;
-use crate::volume::{Grid, Volume};
+use crate::volume::{Grid, Texel, Volume};
 
 /// The maximum error of the field at the voxels, relative to the values' range; SPEC §9 asks for 1e-5.
 const TOLERANCE: f64 = 2e-6;
@@ -84,6 +84,27 @@ pub fn of_volume(volume: &Volume, kernel: (f64, f64)) -> Result<Arc<[f32]>, Rend
             log::info!(target: PROGRESS, "coefficients of splatting.interpolation = \"exact\": {:.0} %", 100.0 * share);
         })
     })
+}
+
+/// The coefficients of the colours of a volume's voxels, red, green, blue and A (SPEC §10); NaN at holes. `None` if voxels have none of their own.
+///
+/// # Errors
+/// As for [`exact`].
+pub fn of_colors(volume: &Volume, kernel: (f64, f64)) -> Result<Option<Arc<[[f32; 4]]>>, RenderError> {
+    let Some(texels) = volume.colors() else { return Ok(None) };
+    let mut colors = vec![[0.0; 4]; texels.len()];
+    for component in 0..4 {
+        let own = |(texel, value): (&Texel, &f32)| {
+            if value.is_nan() { f32::NAN } else { f32::from(texel[component]) / f32::from(u16::MAX) }
+        };
+        let numbers: Vec<f32> = texels.par_iter().zip(volume.values()).map(own).collect();
+        let exact = solved(volume.grid(), &numbers, kernel, &|share| {
+            let percent = 25.0 * (component as f64 + share);
+            log::info!(target: PROGRESS, "coefficients of the voxels' colours: {percent:.0} %");
+        })?;
+        colors.par_iter_mut().zip(exact.par_iter()).for_each(|(color, &number)| color[component] = number);
+    }
+    Ok(Some(colors.into()))
 }
 
 /// The same as [`exact`] gives, from the process's last solutions if they have it.

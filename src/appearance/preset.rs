@@ -1,13 +1,13 @@
 //! Presets: a transfer function for a kind of data, with matching shading and compositing.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::colormap::Colormap;
 use super::hounsfield::Hounsfield;
 use super::object::Object;
 use super::quantile::quantiles;
 use super::{categories, channel_display, constant, xray};
+use crate::parallel::prelude::*;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, TransferFunction};

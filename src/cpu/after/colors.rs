@@ -14,7 +14,6 @@ use crate::after::coefficients;
 use crate::cpu::count::bits;
 use crate::cpu::vector::LANES;
 use crate::error::RenderError;
-use crate::parallel::prelude::*;
 use crate::settings::splatting::Interpolation;
 use crate::volume::{Texel, Volume};
 
@@ -47,24 +46,10 @@ impl Colors {
         interpolation: Interpolation,
         kernel: (f64, f64),
     ) -> Result<Option<Self>, RenderError> {
-        let Some(texels) = volume.colors() else { return Ok(None) };
         if interpolation == Interpolation::Smooth {
-            return Ok(Some(Self::Smooth));
+            return Ok(volume.colors().map(|_| Self::Smooth));
         }
-        let values = volume.values();
-        let mut colors = vec![[0.0; 4]; texels.len()];
-        for component in 0..4 {
-            let own = |(texel, value): (&Texel, &f32)| {
-                if value.is_nan() { f32::NAN } else { share(texel[component]) }
-            };
-            let numbers: Vec<f32> = texels.par_iter().zip(values).map(own).collect();
-            let exact = coefficients::solved(volume.grid(), &numbers, kernel, &|share| {
-                let percent = 25.0 * (component as f64 + share);
-                log::info!(target: coefficients::PROGRESS, "coefficients of the voxels' colours: {percent:.0} %");
-            })?;
-            colors.par_iter_mut().zip(exact.par_iter()).for_each(|(color, &number)| color[component] = number);
-        }
-        Ok(Some(Self::Exact(colors.into())))
+        Ok(coefficients::of_colors(volume, kernel)?.map(Self::Exact))
     }
 
     pub(super) fn of<'a>(&'a self, volume: &'a Volume) -> Option<ColorsOf<'a>> {

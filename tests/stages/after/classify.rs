@@ -97,6 +97,8 @@ fn classified(prepared: &Prepared<'_>, twin: &Frame<'_>, rays: Rays<'_>) -> (Vec
         gradient: scene.shading.gradient,
         labels: labels.is_some(),
         holes: prepared.has_holes(),
+        channels: 1,
+        own_colors: false,
     };
     let carried = init(device, &vec![0_u8; pixels * CARRIED_BYTES as usize], BufferUsages::STORAGE);
     let bound = [stage.bind(device, mode, buffers, (band, &carried))];

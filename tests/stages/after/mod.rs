@@ -15,7 +15,8 @@ use sheetsplat::internals::after::normalization::Normalization;
 use sheetsplat::internals::brick;
 use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::gpu::layout::{Brick, FieldVoxel};
-use sheetsplat::internals::gpu::uniforms::{self, Ramps};
+use sheetsplat::internals::gpu::ramps::{Integration, Ramps, Stored};
+use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::plane_geometry::PlaneGeometry;
@@ -104,7 +105,12 @@ impl<'a> Prepared<'a> {
         let view = ViewGeometry::new(grid, &scene.camera, splatting, [scene.image.width, scene.image.height]).unwrap();
         let coefficients: Vec<f32> = twin.field().coefficients().iter().map(|&c| c as f32).collect();
         let numbers = Normalization::of(coefficients.iter().copied()).unwrap();
-        let ramps = Ramps::with_integrals(transfer, splatting.compositing, &numbers);
+        let integration = Integration {
+            compositing: splatting.compositing,
+            numbers: std::slice::from_ref(&numbers),
+            radius: splatting.radius,
+        };
+        let ramps = Ramps::of_channels(transfer, &[Stored { labels: 1, colors: 0 }], 0, Some(integration));
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
         let values = VolumeTexture::upload(device, queue, volume.values()).unwrap();
         let frame = uniforms::frame(&view, &kernel, (grid, values.format), &ramps, scene);
