@@ -18,7 +18,7 @@ use super::queue::{Queue, Waiting};
 use super::reached::Reached;
 use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
 use super::splat::Splat;
-use super::stream::{Chunk, Stream};
+use super::stream::{Approach, Chunk, Stream};
 use super::vector::LANES;
 use crate::lists::brick;
 use crate::lists::brick::{BRICK_VOXELS, Brick};
@@ -48,6 +48,8 @@ pub(super) struct TileWalk<'a> {
     ring: Ring,
     reached: Reached,
     buffers: Buffers,
+    /// The chunks of a store that may be seen from some sheet on.
+    approach: Approach,
     /// The bricks of a store's chunks that have been read but not arrived, the next one last.
     read: Vec<(Arc<Chunk>, u32)>,
     arrived: Vec<Arrived>,
@@ -71,6 +73,7 @@ impl<'a> TileWalk<'a> {
             ring: Ring::new(),
             reached: Reached::new(),
             buffers: Buffers::new(),
+            approach: Approach::default(),
             read: Vec::new(),
             arrived: Vec::new(),
             marks: Vec::new(),
@@ -114,6 +117,7 @@ impl<'a> TileWalk<'a> {
         }
         self.ring.clear();
         self.buffers.clear();
+        self.approach.clear();
         self.read.clear();
         self.arrived.clear();
         self.marks.clear();
@@ -153,7 +157,8 @@ impl<'a> TileWalk<'a> {
             let is_waiting = self.pending != 0 || !self.queue.is_empty();
             let is_idle = !is_waiting && self.ring.is_empty() && self.buffers.kept == 0 && sheet + 1 >= end;
             let read = self.read.last().map(|(chunk, at)| chunk.placed(*at).first);
-            let next = bricks.peek().map(|placed| placed.first).into_iter().chain(read).min();
+            let chunks = bricks.peek().map(|placed| placed.first).into_iter().chain(self.approach.first());
+            let next = chunks.chain(read).min();
             sheet = match next {
                 Some(first) if is_idle => first.max(sheet + 1),
                 None if is_idle => break,
@@ -187,23 +192,22 @@ impl<'a> TileWalk<'a> {
         );
     }
 
-    /// Reads the chunks that may be seen from a sheet on.
+    /// Reads the chunks of which a brick may be seen at a sheet.
     fn read_chunks<'b>(
         &mut self,
         stream: &Arc<Stream>,
         chunks: &mut Peekable<impl Iterator<Item = &'b Placed>>,
         sheet: i32,
     ) {
-        let mut wanted = Vec::new();
         while let Some(placed) = chunks.next_if(|placed| placed.first <= sheet) {
-            if self.sees_brick(placed) {
-                stream.request(placed.brick);
-                wanted.push(placed.brick);
-            }
+            self.approach.add(stream, placed);
         }
+        let Self { approach, open, origin, .. } = self;
+        let wanted = approach.reached(stream, sheet, |placed| sees(open, *origin, placed));
         if wanted.is_empty() {
             return;
         }
+        wanted.iter().for_each(|&number| stream.request(number));
         let tile = [self.origin[0] / COLUMNS, self.origin[1] / ROWS];
         for chunk in wanted.into_iter().filter_map(|number| stream.chunk(number)) {
             let of_tile = chunk.bricks_of(tile);
@@ -261,9 +265,7 @@ impl<'a> TileWalk<'a> {
 
     /// Whether any pixel is open that a brick's footprints may touch.
     fn sees_brick(&self, placed: &Placed) -> bool {
-        let [x, y] = placed.middle;
-        let center = [x - self.origin[0] as f32, y - self.origin[1] as f32];
-        Pixels::within(center, placed.half).is_some_and(|pixels| self.open.sees(&pixels))
+        sees(&self.open, self.origin, placed)
     }
 
     /// Draws the voxels that start or continue in a sheet.
@@ -413,4 +415,11 @@ impl<'a> TileWalk<'a> {
             },
         );
     }
+}
+
+/// Whether any pixel of a tile, given by its first pixel, is open that footprints of a brick or a box of voxels may touch.
+fn sees(open: &OpenMask, origin: [usize; 2], placed: &Placed) -> bool {
+    let [x, y] = placed.middle;
+    let center = [x - origin[0] as f32, y - origin[1] as f32];
+    Pixels::within(center, placed.half).is_some_and(|pixels| open.sees(&pixels))
 }

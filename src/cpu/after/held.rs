@@ -8,21 +8,20 @@ use super::cells::{Cells, Work, may_show};
 use super::extreme::is_choice;
 use super::frame::Frame;
 use super::matter::Matter;
+use super::needs::Needs;
 use super::place::Placement;
-use super::tile::pixels_of;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::volume::{Grid, Volume};
 
-/// The depth of the slabs whose voxels are held together, in voxels: deeper ones copy less often what neighbouring slabs share, and read more chunks that
-/// opaque pixels turn out to hide.
+/// The depth of the slabs whose voxels are held together, in voxels: deeper ones copy less often what neighbouring slabs share.
 const DEPTH: f64 = 8.0;
 
 /// A value, its bits, and the copies with which those of cells are computed.
 const BYTES_PER_VOXEL: f64 = 7.0;
 
 /// Voxels around those that kernels reach: for the cells of points on borders, rounded, and for differences between neighbours.
-const RIM: f64 = 2.0;
+pub(super) const RIM: f64 = 2.0;
 
 /// A box of a volume's voxels.
 #[derive(Clone, Copy, Debug)]
@@ -60,6 +59,29 @@ pub(super) struct Held {
     pub(super) cells: Option<Cells>,
     /// Whether no value can meet an opacity.
     pub(super) is_blank: bool,
+    /// The chunks that share voxels with the box, and whose voxels nothing needed when it was copied: there are holes in their place.
+    missing: Vec<u32>,
+}
+
+impl Held {
+    /// Whether the voxels suffice for the open pixels of a tile, given by its first pixel, in a slab.
+    pub(super) fn suffices(&self, frame: &Frame<'_>, slab: i32, origin: [usize; 2], open: &OpenMask) -> bool {
+        if !self.slabs.contains(&slab) {
+            return false;
+        }
+        let Matter::Streamed { stream, .. } = frame.matter else { return true };
+        if self.missing.is_empty() {
+            return true;
+        }
+        let needs = Needs::new(frame, stream, slab, origin, open);
+        !self.missing.iter().any(|&number| needs.chunk(number))
+    }
+
+    /// The slab, behind one in which nothing shows, in which something may.
+    pub(super) fn blank_until(&self, slab: i32) -> Option<i32> {
+        // Chunks that are missing may be needed in the next one.
+        self.is_blank.then(|| if self.missing.is_empty() { self.slabs.end } else { slab + 1 })
+    }
 }
 
 impl Frame<'_> {
@@ -69,44 +91,36 @@ impl Frame<'_> {
         let slabs = slab..slab.saturating_add(self.slabs_held());
         let half_box = self.placement.geometry.widest_half_box(&self.placement.view);
         let extent = self.extent(&slabs, origin, open, half_box);
-        let shown = (!is_choice(self.compositing)).then_some(self.integrals.shown);
-        let blank = |values: &[f32]| shown.is_some_and(|shown| !may_show(values, &self.numbers, shown));
-        let around = |(low, dims): (UVec3, UVec3), reach: DVec3| {
-            let reach = reach.ceil().min(extent.dims.as_dvec3()).as_uvec3();
-            (low.saturating_sub(reach), (low + dims + reach).min(extent.dims))
-        };
-        let nothing = |slabs, extent| {
+        let nothing = |missing| {
             let volume = Volume::piece(Grid { dims: UVec3::ZERO, ..self.grid }, Vec::new());
-            Some(Held { slabs, extent, volume, cells: None, is_blank: true })
+            Some(Held { slabs: slabs.clone(), extent, volume, cells: None, is_blank: true, missing })
         };
-        // Holes only have no value, and so no opacity.
-        let is_dark = |[min, max]: [f32; 2]| shown.is_some() && (min > max || blank(&[min, max]));
-        if stream.range((extent.low, extent.held)).is_some_and(is_dark) {
-            return nothing(slabs, extent);
+        if stream.range((extent.low, extent.held)).is_some_and(|range| self.is_dark(range)) {
+            return nothing(Vec::new());
         }
-        let is_seen = |number: u32, chunk: (UVec3, UVec3)| {
-            let (on_screen, within) = self.placement.bounds(around(chunk, half_box + RIM));
-            let is_there = within.start < slabs.end && slabs.start < within.end;
-            if !(is_there && pixels_of(origin, on_screen).is_some_and(|pixels| open.sees(&pixels))) {
-                return false;
-            }
-            // As bricks in memory are left out: no value between those within two kernels and a slab may have an opacity.
-            if stream.is_unread(number) {
-                return true;
-            }
-            let (low, end) = around(chunk, half_box * 2.0 + self.placement.slab_step() + RIM);
-            !stream.range((low, end - low)).is_some_and(is_dark)
-        };
-        let seen = stream.seen((extent.low, extent.held), is_seen);
+        let needs = Needs::new(self, stream, slab, origin, open);
+        let (seen, missing): (Vec<u32>, Vec<u32>) =
+            stream.chunks_in((extent.low, extent.held)).partition(|&number| needs.chunk(number));
+        let shown = self.shown();
         if seen.is_empty() && shown.is_some() {
-            return nothing(slabs, extent);
+            return nothing(missing);
         }
         let values = stream.values((extent.low, extent.held), &seen);
-        let is_blank = blank(&values);
+        let is_blank = shown.is_some_and(|shown| !may_show(&values, &self.numbers, shown));
         let grid = Grid { dims: extent.held, ..self.grid };
         let cells = shown.filter(|_| !is_blank);
         let cells = cells.map(|shown| Cells::new(&grid, &values, &self.numbers, half_box, shown, Work::Alone));
-        Some(Held { slabs, extent, volume: Volume::piece(grid, values), cells, is_blank })
+        Some(Held { slabs, extent, volume: Volume::piece(grid, values), cells, is_blank, missing })
+    }
+
+    /// The least and the greatest number with an opacity; `None` where all values count.
+    fn shown(&self) -> Option<[f32; 2]> {
+        (!is_choice(self.compositing)).then_some(self.integrals.shown)
+    }
+
+    /// Whether no value between two has an opacity. If there are only holes, of which the minimum is the larger one, there is no value.
+    pub(super) fn is_dark(&self, [min, max]: [f32; 2]) -> bool {
+        self.shown().is_some_and(|shown| min > max || !may_show(&[min, max], &self.numbers, shown))
     }
 
     /// The number of slabs whose voxels are held together.

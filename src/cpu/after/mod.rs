@@ -20,6 +20,7 @@ mod frame;
 mod held;
 mod low_pass;
 mod matter;
+mod needs;
 mod place;
 mod planes;
 mod slab_integral;

@@ -132,7 +132,7 @@ impl<'a> TileWalk<'a> {
                 continue;
             }
             self.enter(slab);
-            if let Some(end) = self.blank_until() {
+            if let Some(end) = self.blank_until(slab) {
                 slab = end;
                 continue;
             }
@@ -158,7 +158,7 @@ impl<'a> TileWalk<'a> {
         let Self { channels, origin, open, .. } = self;
         for Channel { frame, planes, .. } in channels {
             planes.swap(0, 1);
-            if planes[0].held.as_ref().is_none_or(|held| !held.slabs.contains(&slab)) {
+            if planes[0].held.as_ref().is_none_or(|held| !held.suffices(frame, slab, *origin, open)) {
                 let held = frame.hold(slab, *origin, open).map(Arc::new);
                 planes.iter_mut().for_each(|plane| plane.held.clone_from(&held));
             }
@@ -170,10 +170,9 @@ impl<'a> TileWalk<'a> {
         }
     }
 
-    /// The slab before which no voxel that the tile holds of a store has an opacity; `None` if one may have.
-    fn blank_until(&self) -> Option<i32> {
-        let blank =
-            |channel: &Channel<'_>| Some(channel.planes[0].held.as_ref().filter(|held| held.is_blank)?.slabs.end);
+    /// The slab, behind the current one, before which no voxel that the tile holds of a store has an opacity; `None` if one may have in the current one.
+    fn blank_until(&self, slab: i32) -> Option<i32> {
+        let blank = |channel: &Channel<'_>| channel.planes[0].held.as_ref()?.blank_until(slab);
         self.channels.iter().map(blank).reduce(|a, b| Some(a?.min(b?))).flatten()
     }
 

@@ -2,6 +2,7 @@
 //! opaque pixels is never read. Images are those of the volume in memory: byte by byte, but where classification comes after splatting and the store does not
 //! know the range of its values, to rounding.
 
+mod approach;
 mod chunk;
 mod pool;
 mod ranges;
@@ -18,6 +19,7 @@ use crate::lists::quad_plan::Overlaps;
 use crate::parallel::ThreadPool;
 use crate::volume::Grid;
 use crate::volume::range::{EMPTY, union};
+pub(super) use approach::Approach;
 pub(super) use chunk::Chunk;
 use pool::Pool;
 pub use renderer::StreamRenderer;
@@ -50,15 +52,19 @@ impl Stream {
         self.source.bounds(number)
     }
 
-    /// The chunks that share voxels with a box, given by its first voxel and its voxels along each axis, and that `is_seen` holds of, which gets a chunk's
-    /// number and its box.
-    pub(super) fn seen(&self, within: (UVec3, UVec3), is_seen: impl Fn(u32, (UVec3, UVec3)) -> bool) -> Vec<u32> {
-        self.chunks_in(within).filter(|&number| is_seen(number, self.bounds(number))).collect()
-    }
-
     /// The minimum and maximum of the values in the chunks that share voxels with a box, as far as they are known.
     pub(super) fn range(&self, within: (UVec3, UVec3)) -> Option<[f32; 2]> {
         self.chunks_in(within).try_fold(EMPTY, |all, number| Some(union(all, self.source.known_range(number)?)))
+    }
+
+    /// Where a box of a chunk's voxels is, given by its first voxel and its voxels along each axis; `None` off the image.
+    fn place(&self, number: u32, within: (UVec3, UVec3)) -> Option<Placed> {
+        self.source.place(number, within)
+    }
+
+    /// Whether none of a chunk's voxels is splatted, as far as its values are known.
+    fn shows_nothing(&self, number: u32) -> bool {
+        self.source.shows_nothing(number)
     }
 
     /// Whether nothing is known of a chunk's values.
@@ -66,8 +72,8 @@ impl Stream {
         self.source.known_range(number).is_none()
     }
 
-    /// The chunks that share voxels with a box.
-    fn chunks_in(&self, (low, dims): (UVec3, UVec3)) -> impl Iterator<Item = u32> {
+    /// The chunks that share voxels with a box, given by its first voxel and its voxels along each axis.
+    pub(super) fn chunks_in(&self, (low, dims): (UVec3, UVec3)) -> impl Iterator<Item = u32> {
         let (side, across) = (self.source.side, self.source.across());
         let (first, last) = (low / side, (low + dims - 1) / side);
         let number = move |x, y, z| x + across.x * (y + across.y * z);

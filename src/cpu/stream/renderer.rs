@@ -21,6 +21,7 @@ use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::kernel::Kernel;
+use crate::lists::iso_range::ValueSet;
 use crate::parallel::{ThreadPoolBuilder, current_num_threads};
 use crate::part::{self, Content, Part};
 use crate::rendering::Rendering;
@@ -213,6 +214,7 @@ impl StreamRenderer {
                 ranges: Ranges::new(StoreLevel { grid, chunk: side }.chunks().element_product()),
                 splats: (splatting.classification == Classification::Before).then(|| Splats {
                     transfer: self.transfer.clone(),
+                    shown: ValueSet::of_tables(&self.transfer.tables(None)),
                     clipped: scene.clip.voxels(&grid, splatting.radius),
                     projection: Projection::new(view, splatting.order, &slabs),
                     support: Kernel::new(splatting.radius, splatting.falloff).support(),

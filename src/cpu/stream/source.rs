@@ -22,6 +22,9 @@ const LEAST_SIDE: u32 = 32;
 const MOST_CHUNKS: u128 = 1 << 24;
 const MOST_VOXELS: u128 = 1 << 30;
 
+/// What boxes of voxels are wider than their bricks, in voxels, so that no brick comes before a box that holds it: more than rounding errors.
+const SLACK: f64 = 1e-6;
+
 /// A level of a store in a view.
 #[derive(Debug)]
 pub(super) struct Source {
@@ -39,6 +42,8 @@ pub(super) struct Source {
 #[derive(Debug)]
 pub(super) struct Splats {
     pub(super) transfer: TransferFunction,
+    /// The values that are splatted.
+    pub(super) shown: ValueSet,
     /// The voxels that clip planes leave.
     pub(super) clipped: ClippedVoxels,
     pub(super) projection: Projection,
@@ -99,23 +104,26 @@ impl Source {
 
     /// All chunks that may be on the image, by first sheet.
     pub(super) fn placed(&self) -> Vec<Placed> {
-        let Some(Splats { projection, support, transfer, .. }) = &self.splats else { return Vec::new() };
-        let values = ValueSet::of_tables(&transfer.tables(None));
-        let place = |number| {
-            let range = self.known_range(number);
-            if range.is_some_and(|[min, max]| min > max || !values.meets(min, max)) {
-                return None;
-            }
-            let (from, dims) = self.bounds(number);
-            let half = (dims.as_dvec3() - 1.0) / 2.0;
-            let placed = place_box(number, (from.as_dvec3() + half, half), projection, *support)?;
-            // Rounding must not let one of its bricks come before it, stay after it, or be seen where it is not.
-            let half = placed.half.map(|half| half * (1.0 + 8.0 * f32::EPSILON) + 0.01);
-            Some(Placed { first: placed.first - 1, end: placed.end + 1, half, ..placed })
-        };
+        let place = |number| if self.shows_nothing(number) { None } else { self.place(number, self.bounds(number)) };
         let mut placed: Vec<Placed> = (0..self.across().element_product()).filter_map(place).collect();
         placed.sort_unstable_by_key(|placed| (placed.first, placed.brick));
         placed
+    }
+
+    /// Where the voxels of a chunk within a box are, whatever their values; `None` off the image, or if voxels are not splatted.
+    pub(super) fn place(&self, number: u32, (from, dims): (UVec3, UVec3)) -> Option<Placed> {
+        let Splats { projection, support, .. } = self.splats.as_ref()?;
+        let half = (dims.as_dvec3() - 1.0) / 2.0;
+        let placed = place_box(number, (from.as_dvec3() + half, half + SLACK), projection, *support)?;
+        // Rounding must not let one of its bricks be seen where it is not.
+        let half = placed.half.map(|half| half * (1.0 + 8.0 * f32::EPSILON) + 0.01);
+        Some(Placed { half, ..placed })
+    }
+
+    /// Whether none of a chunk's voxels is splatted, as far as its values are known.
+    pub(super) fn shows_nothing(&self, number: u32) -> bool {
+        let Some(Splats { shown, .. }) = &self.splats else { return false };
+        self.known_range(number).is_some_and(|[min, max]| min > max || !shown.meets(min, max))
     }
 
     /// The box that a chunk is read with: its voxels, and with gradient opacity, which needs gradients to decide what takes part, those around them.

@@ -107,6 +107,14 @@ impl<'a> Field<'a> {
         Field { volume, extent: held.extent, coefficients: volume.values(), colors: None, ..*self }
     }
 
+    /// The distance of voxels from a point that its value needs, by axis, where kernels reach some distance: those of its cube, too; and with
+    /// `has_gradient` those that its gradient needs.
+    pub(super) fn reach(&self, half_box: DVec3, has_gradient: bool) -> DVec3 {
+        let of_value = half_box.ceil().max(DVec3::splat(cube::SIDE as f64 / 2.0));
+        let is_difference = has_gradient && self.gradient == Gradient::Differences;
+        if is_difference { of_value + 1.0 } else { of_value }
+    }
+
     /// Whether voxels have colours of their own.
     pub(super) fn has_colors(&self) -> bool {
         self.colors.is_some()
