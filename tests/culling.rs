@@ -27,8 +27,9 @@ use common::{
 /// of at most 1 differ by some 1e-5.
 const ROUNDING: f64 = 2e-5;
 
-/// Set by the measurement of [`culling_is_nearly_exact`].
-const NATIVE_RATIO: f64 = 1.25;
+/// What the native backend may draw of [`culling_is_nearly_exact`]: it draws 1.24 times the exact sections orthographic and 1.27 times in perspective, because it tests
+/// a voxel once, with one box for all of its sections, when the first of its sheets opens.
+const NATIVE_RATIO: f64 = 1.3;
 
 fn headless(sheets_per_group: Option<u32>) -> GpuHeadless {
     let mut options = lavapipe();
@@ -173,7 +174,7 @@ fn culled_frames_are_byte_identical() {
 
 /// What is drawn is what the exact test of every section's own box lets through, and little more: on the GPU the sheets of a group are tested at once,
 /// in perspective with one box for all. For slices that are slanted in perspective this is the box of their nearest corner, which is far
-/// larger than most. The native backend draws all sections of a voxel at once, when its first sheet opens, and none of them is tested again.
+/// larger than most.
 #[test]
 fn culling_is_nearly_exact() {
     let headless = headless(None);

@@ -210,7 +210,7 @@ mod tests {
     /// Another transfer function tests the kept ranges of bricks anew, and makes another list of bricks only if it shows others.
     #[test]
     fn a_changed_transfer_function_tests_the_kept_ranges() {
-        let sets = ["image={width=16,height=16}", "transfer.opacity=[[60,0],[100,0.5]]"].map(str::to_owned);
+        let sets = ["image={width=16,height=16}", "camera.fit=volume"].map(str::to_owned);
         let mut scene = Scene::from_volume(VolumeSource::Builtin("head:24".to_owned()), &sets).unwrap();
         scene.splatting.classification = Classification::After;
         let mut renderer = CpuRenderer::new(scene.load_volume().unwrap(), &scene).unwrap();

@@ -103,22 +103,19 @@ impl Coefficients {
     ) {
         let (geometry, grid) = (PlaneGeometry::new(view, volume.grid()), volume.grid());
         let reaches = [geometry.reach(view), geometry.reach_from_cells(view)];
+        let is_stale = std::mem::take(&mut self.is_stale);
         let kept = self.ranges.take().filter(|ranges| ranges.reaches == reaches);
-        let (old, is_stale) = (self.shown.take(), std::mem::take(&mut self.is_stale));
-        let (ranges, old) = match (kept, old) {
-            (Some(ranges), Some(shown)) if !is_stale => {
-                (self.ranges, self.shown) = (Some(ranges), Some(shown));
-                return;
-            }
-            (Some(ranges), old) => (ranges, old),
-            (None, old) => {
-                let [of_kernels, of_cells] = reaches.map(|reach| BrickRanges::new(grid, self.all(volume), reach));
-                (Ranges { reaches, of_kernels, of_cells }, old)
-            }
-        };
+        if kept.is_some() && self.shown.is_some() && !is_stale {
+            self.ranges = kept;
+            return;
+        }
+        let ranges = kept.unwrap_or_else(|| {
+            let [of_kernels, of_cells] = reaches.map(|reach| BrickRanges::new(grid, self.all(volume), reach));
+            Ranges { reaches, of_kernels, of_cells }
+        });
         let bearing = Bearing::of(compositing);
         let are_shown = ranges.of_kernels.shown(volume, transfer, bearing);
-        let bricks = match old {
+        let bricks = match self.shown.take() {
             Some(old) if old.are_shown == are_shown => old.bricks,
             _ => BrickList::new(grid, &ranges.of_kernels.voxels(volume, |brick| are_shown[brick])),
         };
