@@ -28,22 +28,14 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     // The last instance may have fewer quads: the others repeat the last one, without area.
     let quad = instance * QUADS + vertex / 4u;
     let voxel = voxels[instances[min(quad, args.count - 1u)]];
-    let lies = on_plane(vec2f(voxel.x, voxel.y), voxel.depth, sheet_group.near);
-    let extent = sqrt(max(frame.radius * frame.radius - lies.distance * lies.distance, 0.0));
-    let reach = (extent + MARGIN) / lies.per_pixel;
-    let side = side_of(vertex);
-    let axis = planes.screen_axis;
-    let a = axis * reach.x;
-    let b = vec2f(-axis.y, axis.x) * reach.y;
-    let corner = clip_corner(lies.center_px, a * side.x + b * side.y, side, abs(a) + abs(b));
-    let position = select(NOWHERE, corner, extent > 0.0 && quad < args.count);
+    let lies = quad_on_plane(voxel, vertex, quad < args.count);
     return Quad(
-        position,
+        lies.position,
         lies.center_px,
-        vec4f(axis * lies.per_pixel.x, vec2f(-axis.y, axis.x) * lies.per_pixel.y),
+        lies.rows,
         voxel.number,
         vec4f(unpacked(voxel.gradient_xy, voxel.gradient_z), lies.distance),
-        vec2f(-frame.falloff, frame.radius * frame.radius),
+        plane_kernel(),
     );
 }
 
@@ -54,9 +46,8 @@ fn fragment(quad: Quad) -> Two {
     start(u32(quad.position.z));
     // From the pixel's centre, not an interpolated coordinate: the rasterizer snaps corners to a coarse grid.
     let offset = quad.position.xy - quad.center_px;
-    let place = vec3f(dot(quad.rows.xy, offset), dot(quad.rows.zw, offset), quad.gradient.w);
-    let squared = dot(place, place);
-    let weight = select(0.0, exp(quad.kernel.x * squared), squared < quad.kernel.y);
+    let place = from_voxel(quad.rows, offset, quad.gradient.w);
+    let weight = weight_at(place, quad.kernel);
     let both = weight * vec2f(1.0, quad.number);
     if KERNEL_GRADIENT {
         let moment = weight * place;

@@ -24,20 +24,7 @@ fn vertex(@builtin(vertex_index) corner: u32, @builtin(instance_index) instance:
 fn fragment(corner: Corner) -> @location(0) vec4f {
     start(u32(corner.position.z));
     let pixel = vec2u(vec2i(corner.position.xy) - corner.origin);
-    var image = acc[(pixel.y - band.first_row) * frame.size.x + pixel.x];
-    switch frame.compositing {
-        case XRAY, AVERAGE: {
-            image = min(image, vec4f(1.0));
-        }
-        case MINIMUM: {
-            image.a = select(2.0 - image.a, 0.0, image.a == 0.0);
-        }
-        case SURFACE: {
-            image = select(vec4f(0.0), image, image.a >= 1.0);
-        }
-        default: {
-        }
-    }
+    var image = finished(acc[(pixel.y - band.first_row) * frame.size.x + pixel.x], frame.compositing);
     image += (1.0 - image.a) * frame.background;
     if LINEAR_LIGHT && image.a > 0.0 {
         image = vec4f(decode(image.rgb / image.a) * image.a, image.a);

@@ -3,7 +3,7 @@
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var values: texture_2d_array<u32>;
-// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
+// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the tables of labels and channels.
 @group(0) @binding(3) var<storage, read> control_points: array<vec4f>;
 // Places: 64 times the brick's index, plus the slot.
 @group(0) @binding(4) var<storage, read> fresh: array<u32>;
@@ -24,24 +24,22 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     let p = project(voxel);
     let light = lighting(p.xy, frame.near > 0.0);
     // A voxel's footprint is the same in all channels, so their amounts are drawn as one (SPEC §10).
-    var sum = amount_in_channel(voxel, 0u, ramps_of(index_of(voxel)), light);
+    var sum = amount_in_channel(voxel, 0u, light);
     for (var channel = 1u; channel < CHANNELS; channel += 1u) {
-        read_channel(channel);
-        sum += amount_in_channel(voxel, channel, ramps_of_channel(channel), light);
+        sum += amount_in_channel(voxel, channel, light);
     }
     splats[id] = Splat(p.x, p.y, p.z, p.w, pack2x16float(sum.rg), pack2x16float(sum.ba));
 }
 
-// A voxel's colour and amount per unit length in the channel that is read, `(C·m, m)`; 0 in a hole.
-fn amount_in_channel(voxel: vec3u, channel: u32, ramps: vec4u, light: Lighting) -> vec4f {
+// A voxel's colour and amount per unit length in a channel, `(C·m, m)`; 0 in a hole.
+fn amount_in_channel(voxel: vec3u, channel: u32, light: Lighting) -> vec4f {
+    read_channel(channel);
     let index = index_of(voxel);
+    let ramps = ramps_of(channel, index);
     let stored = stored_at(index);
     let value = value_of(stored);
     let gradient = gradient_at(voxel);
-    var own = vec4f(ramp(ramps.x, ramps.y, value), 1.0);
-    if channel == 0u {
-        own = own_color(index, own.rgb);
-    }
+    let own = own_color(channel, index, ramp(ramps.x, ramps.y, value));
     let opacity = ramp(ramps.y, ramps.z, value).x;
     let gradient_opacity = ramp(ramps.z, ramps.w, gradient.magnitude).x;
     let m = amount(opacity * gradient_opacity * own.a);

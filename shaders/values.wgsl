@@ -20,6 +20,7 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     let id = fresh[at];
     let voxel = voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS);
     let p = homogeneous(vec4f(vec3f(voxel), 1.0));
+    read_channel(planes.channel);
     let gradient = half_differences(voxel) * (2.0 * planes.value_scale);
     let bits = packed(gradient);
     voxels[id] = FieldVoxel(p.x, p.y, p.z, number_at(index_of(voxel)), bits.x, bits.y);

@@ -116,6 +116,7 @@ pub mod headless;
 pub mod image;
 mod kernel;
 mod lists;
+mod parallel;
 pub mod part;
 #[cfg(feature = "gpu")]
 mod pass;
@@ -192,7 +193,7 @@ pub mod internals {
     #[cfg(feature = "gpu")]
     pub mod gpu {
         pub use crate::gpu::{
-            bindings, brick_lists, classified_volume, device, footprint_texture, gathered_layout, layout,
+            bindings, brick_lists, classified_volume, device, footprint_texture, gathered_layout, layout, ramps,
             render_pipeline, shaders, targets, timer, uniforms, volume_texture,
         };
     }
@@ -201,7 +202,8 @@ pub mod internals {
     #[cfg(feature = "gpu")]
     pub mod pass {
         pub use crate::pass::{
-            classify, composite, cull, field, first_hit, gather, occlude, resolve, sample, shade, splat, tiles, values,
+            classify, composite, cull, field, field_colors, first_hit, gather, join, occlude, resolve, sample, shade,
+            splat, tiles, values,
         };
     }
 

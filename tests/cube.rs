@@ -10,12 +10,12 @@ use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::Ramp;
-use sheetsplat::settings::{Compositing, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{Compositing, Method, Splatting};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::compare::assert_at_most;
 use common::images::color_rms;
-use common::{gpu, scene, transfer};
+use common::{DRAWINGS, Drawing, gpu, scene, transfer};
 
 const SIZE: u32 = 256;
 
@@ -63,13 +63,9 @@ impl Turned {
 #[test]
 fn the_cube_does_not_pop() {
     let gpu = gpu();
-    let on_gpu = |rasterizer| {
+    let by = |drawing: Drawing| {
         let gpu = &gpu;
-        move |volume: &Volume, scene: &Scene| {
-            let mut scene = scene.clone();
-            scene.splatting.rasterizer = rasterizer;
-            gpu.render_volume(volume.clone(), &scene).unwrap().image
-        }
+        move |volume: &Volume, scene: &Scene| drawing.render(gpu, volume, scene).image
     };
     let twin =
         |volume: &Volume, scene: &Scene| reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap();
@@ -77,14 +73,16 @@ fn the_cube_does_not_pop() {
     let cosines = 44.8_f64.to_radians().cos() / 45.2_f64.to_radians().cos();
     let (volume, mut scene) = cube();
     let by_all = |scene: &Scene| {
-        [
-            ("twin", Turned::new("twin", twin, &volume, scene.clone())),
-            ("quads", Turned::new("quads", on_gpu(Rasterizer::Quads), &volume, scene.clone())),
-            ("tiles", Turned::new("tiles", on_gpu(Rasterizer::Tiles), &volume, scene.clone())),
-        ]
+        let drawn = DRAWINGS.map(|drawing| {
+            let name = format!("{drawing:?}");
+            let turned = Turned::new(&name, by(drawing), &volume, scene.clone());
+            (name, turned)
+        });
+        let twin = ("twin".to_owned(), Turned::new("twin", twin, &volume, scene.clone()));
+        drawn.into_iter().chain([twin]).collect::<Vec<_>>()
     };
     for (name, Turned { rms, ratio }) in by_all(&scene) {
-        assert_at_most(rms, 0.003, name);
+        assert_at_most(rms, 0.003, &name);
         // Along the flatter of two rays more of the lit layer lies before the dark inside, which reduces the ratio slightly.
         assert!(1.0 < ratio && ratio < cosines, "{name}: {ratio}");
     }
@@ -96,7 +94,7 @@ fn the_cube_does_not_pop() {
     scene.splatting.method = Method::ImageAligned;
     scene.splatting.compositing = Compositing::Exponential;
     for (name, Turned { rms, ratio }) in by_all(&scene) {
-        assert_at_most(rms, 0.00165, name);
+        assert_at_most(rms, 0.00165, &name);
         assert!(1.0027 < ratio && ratio < cosines, "{name}: {ratio}");
     }
     // A lit layer that hides everything behind it.

@@ -13,16 +13,23 @@ use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::Camera;
 use sheetsplat::settings::Projection;
 use sheetsplat::settings::Ramp;
-use sheetsplat::settings::{Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{Classification, Compositing, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::compare::assert_at_most;
 use common::images::largest_difference;
-use common::{FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye, random_volume, scene, transfer};
+use common::{
+    DRAWINGS, Drawing, FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye, random_volume, scene,
+    transfer,
+};
 
 /// The rounding errors of f32 and f16 between two ways to the same image: amounts are the same f16 numbers; sums of a few hundred f32 terms
 /// of at most 1 differ by some 1e-5.
 const ROUNDING: f64 = 2e-5;
+
+/// What the native backend may draw of [`culling_is_nearly_exact`]: it draws 1.24 times the exact sections orthographic and 1.27 times in perspective, because it tests
+/// a voxel once, with one box for all of its sections, when the first of its sheets opens.
+const NATIVE_RATIO: f64 = 1.3;
 
 fn headless(sheets_per_group: Option<u32>) -> GpuHeadless {
     let mut options = lavapipe();
@@ -146,11 +153,27 @@ fn culled_frames_are_byte_identical() {
                 assert!(first.image == again.image && first.stats.counts == again.stats.counts, "{scene:?}");
             }
         }
+        // After splatting there are no footprints.
+        scene.splatting = Splatting {
+            classification: Classification::After,
+            method: Method::ImageAligned,
+            footprint: FootprintForm::SummedArea,
+            footprint_box: FootprintBox::Rectangle,
+            ..scene.splatting
+        };
+        for rasterizer in RASTERIZERS {
+            scene.splatting.rasterizer = rasterizer;
+            let first = render(&devices[0], &volume, &scene);
+            for device in &devices {
+                let again = render(device, &volume, &scene);
+                assert!(first.image == again.image && first.stats.counts == again.stats.counts, "{scene:?}");
+            }
+        }
     }
 }
 
-/// The GPU draws what the exact test of every section's own box lets through, and little more: the sheets of a group are tested at once, in
-/// perspective with one box for all. For slices that are slanted in perspective this is the box of their nearest corner, which is far
+/// What is drawn is what the exact test of every section's own box lets through, and little more: on the GPU the sheets of a group are tested at once,
+/// in perspective with one box for all. For slices that are slanted in perspective this is the box of their nearest corner, which is far
 /// larger than most.
 #[test]
 fn culling_is_nearly_exact() {
@@ -163,15 +186,15 @@ fn culling_is_nearly_exact() {
         for method in [Method::ImageAligned, Method::AxisAligned] {
             (scene.camera.projection, scene.splatting.method) = (projection, method);
             let exact = reference::render_culled(&volume, &transfer, &scene, Some(Test::Box)).unwrap().sections;
-            for rasterizer in RASTERIZERS {
-                scene.splatting.rasterizer = rasterizer;
-                let counts = render(&headless, &volume, &scene).stats.counts;
+            for drawing in DRAWINGS {
+                let counts = drawing.render(&headless, &volume, &scene).stats.counts;
                 let (drawn, all) = (counts.sections_rasterized, counts.sections_total);
                 let ratio = drawn as f64 / exact as f64;
-                let what = format!("{projection:?}, {method:?}, {rasterizer:?}");
+                let what = format!("{projection:?}, {method:?}, {drawing:?}");
                 println!("{what}: {drawn} of {all} sections, exactly {exact}: ratio {ratio:.3}");
                 let has_slanted_slices = projection == eye && method == Method::AxisAligned;
-                assert!(ratio >= 0.99 && (ratio <= 1.25 || has_slanted_slices), "{what}: {ratio}");
+                let most = if drawing == Drawing::Native { NATIVE_RATIO } else { 1.25 };
+                assert!(ratio >= 0.99 && (ratio <= most || has_slanted_slices), "{what}: {ratio}");
             }
         }
     }

@@ -18,7 +18,7 @@ use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host, ray_march};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Classification, Compositing, Method, Order, Rasterizer};
+use sheetsplat::settings::{Classification, Compositing, Method, Order, Rasterizer, Splatting};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Grid, Volume, builtin};
 use sheetsplat::{Pick, RenderError, SceneView, SettingError};
@@ -219,16 +219,20 @@ fn walls() {
     let mut scene = scene(100, 90);
     scene.camera.direction = DVec3::new(0.4, 0.8, -0.3);
     let unit = volume.grid().unit();
-    for (rasterizer, projection) in RASTERIZERS.into_iter().flat_map(|rasterizer| {
+    for (drawing, projection) in DRAWINGS.into_iter().flat_map(|drawing| {
         let perspective = Projection::Perspective { fov_y: 40.0, distance: Some(400.0), near: None };
-        [Projection::Orthographic { height: None }, perspective].map(|projection| (rasterizer, projection))
+        [Projection::Orthographic { height: None }, perspective].map(|projection| (drawing, projection))
     }) {
-        (scene.splatting.rasterizer, scene.camera.projection) = (rasterizer, projection);
+        scene.camera.projection = projection;
         let view = view_of(&volume, &scene);
         let middle = view.rays().depth_of(DVec3::ZERO);
         let with_wall = |depth: Option<f64>| {
-            let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
             let wall = depth.map(|depth| vec![depth; 9000]);
+            let Drawing::By(rasterizer) = drawing else {
+                return draw_natively(&volume, &scene, (wall.as_deref(), None));
+            };
+            let scene = Scene { splatting: Splatting { rasterizer, ..scene.splatting }, ..scene.clone() };
+            let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
             let planes = [middle - 60.0, middle + 90.0];
             scene_view
                 .set_surfaces(wall.map(|wall| surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &wall, [0, 0])))
@@ -241,15 +245,17 @@ fn walls() {
             with_wall(Some(middle - 50.0)),
             with_wall(Some(middle - 12.0)),
         );
-        assert_eq!(none.0, behind.0);
+        // The native backend scales the sheets of rays that end, by 1 here but for rounding.
+        let rounding = if drawing == Drawing::Native { 2e-6 } else { 0.0 };
+        assert_at_most(largest_difference(&none.0, &behind.0), rounding, format_args!("{drawing:?}, {projection:?}"));
         assert!(before.0.pixels.iter().all(|&pixel| pixel == BLACK));
         let [hidden, cut, all] = [&before, &between, &none].map(|(_, _, counts)| counts.sections_rasterized);
-        assert!(hidden < all / 10, "{rasterizer:?}: {hidden} sections behind a wall, {all} without");
+        assert!(hidden < all / 10, "{drawing:?}: {hidden} sections behind a wall, {all} without");
         assert!(cut <= all);
         // The wall runs through the face.
         let difference = largest_difference(&between.0, &none.0);
-        println!("{rasterizer:?}: {hidden}, {cut}, {all} sections, difference {difference}");
-        assert_at_least(difference, 0.5, format_args!("{rasterizer:?}, {projection:?}"));
+        println!("{drawing:?}: {hidden}, {cut}, {all} sections, difference {difference}");
+        assert_at_least(difference, 0.5, format_args!("{drawing:?}, {projection:?}"));
     }
 }
 
@@ -264,7 +270,6 @@ fn cuts_are_exact_along_rays() {
     scene.splatting.compositing = Compositing::Exponential;
     scene.splatting.culling = false;
     scene.splatting.slab_width = 0.5;
-    scene.splatting.rasterizer = Rasterizer::Tiles;
     let grid = *volume.grid();
     let half = grid.center() * grid.spacing;
     let perspective = Projection::Perspective { fov_y: 30.0, distance: None, near: None };
@@ -280,16 +285,19 @@ fn cuts_are_exact_along_rays() {
         scene.clip.crop = Some([-half * DVec3::new(2.0, 2.0, 0.5), half * 2.0]);
         let transfer = scene.transfer.resolve(&volume);
         let pixels: Vec<UVec2> = (0..12_000).step_by(7).map(|at| UVec2::new(at % 120, at / 120)).collect();
-        let marched = ray_march::pixels(&volume, &transfer, &scene, &pixels).unwrap();
-        let image = gpu.render_volume(volume.clone(), &scene).unwrap().image;
-        let drawn: Vec<[f32; 4]> = pixels.iter().map(|at| image.pixels[(at.y * 120 + at.x) as usize]).collect();
-        let decibels = psnr(&drawn, &marched, BLACK, 100);
-        scene.clip = Clip::default();
-        let whole = gpu.render_volume(volume.clone(), &scene).unwrap().image;
-        let whole: Vec<[f32; 4]> = pixels.iter().map(|at| whole.pixels[(at.y * 120 + at.x) as usize]).collect();
-        let unclipped = psnr(&whole, &ray_march::pixels(&volume, &transfer, &scene, &pixels).unwrap(), BLACK, 100);
-        println!("{normal:?} {d}, {projection:?}: {decibels:.1} dB, {unclipped:.1} dB of the whole volume");
-        assert_at_least(decibels, 47.0, format_args!("{normal:?} {d}, {projection:?}"));
+        let whole = Scene { clip: Clip::default(), ..scene.clone() };
+        let [marched, marched_whole] =
+            [&scene, &whole].map(|scene| ray_march::pixels(&volume, &transfer, scene, &pixels).unwrap());
+        for drawing in [Drawing::By(Rasterizer::Tiles), Drawing::Native] {
+            let [decibels, unclipped] = [(&scene, &marched), (&whole, &marched_whole)].map(|(scene, marched)| {
+                let image = drawing.render(&gpu, &volume, scene).image;
+                let drawn: Vec<[f32; 4]> = pixels.iter().map(|at| image.pixels[(at.y * 120 + at.x) as usize]).collect();
+                psnr(&drawn, marched, BLACK, 100)
+            });
+            let what = format!("{drawing:?}, {normal:?} {d}, {projection:?}");
+            println!("{what}: {decibels:.1} dB, {unclipped:.1} dB of the whole volume");
+            assert_at_least(decibels, 47.0, what);
+        }
     }
 }
 

@@ -1,6 +1,7 @@
 //! Small pictures of the builtin volumes, compared with those in `tests/goldens`.
 //!
-//! The native backend makes them, and draws every byte of them again on any machine. Each rasterizer on Mesa's lavapipe is held to them with a tolerance:
+//! The native backend makes them, and draws every byte of them again on any machine, with every instruction set that it has (or with the one that
+//! `SHEETSPLAT_SIMD` names). Each rasterizer on Mesa's lavapipe is held to them with a tolerance:
 //! f32 sums are taken in other orders there, and lavapipe's approximate reciprocals differ between processors. A failing picture and its
 //! differences are left in `target/goldens`. `SHEETSPLAT_BLESS=all`, or the names of scenes separated by commas, rewrites the goldens that fail, and only those.
 #![cfg(all(feature = "golden", feature = "cpu"))]
@@ -8,11 +9,14 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::{DVec3, UVec3};
+use sheetsplat::cpu::{CpuRenderer, Simd};
 use sheetsplat::golden;
-use sheetsplat::golden::{Bless, Picture, Tolerance};
-use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
+use sheetsplat::golden::{Bless, Comparison, Picture, Tolerance};
+use sheetsplat::headless::{Backend, Headless, HeadlessOptions, Rendering};
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::Classification;
+use sheetsplat::volume::{SampleType, Volume};
 
 /// Rasterizers find voxels hidden at different sheets, which may change the picture by one minus this: too little to see.
 const OPACITY_THRESHOLD: f64 = 0.999;
@@ -325,10 +329,45 @@ const SCENES: [(&str, &str, &[&str]); 32] = [
             "image={width=128,height=128}",
             "camera={direction=[0.6,0.7,-0.35],height=190.0}",
             "preset=\"fusion\"",
-            "channel=[{transfer={opacity=[[20,0],[90,0.03],[200,0.08]]}},{volume={builtin=\"tomato:32\",spacing=[3,3,7]},transfer={opacity=[[90,0],[255,0.3]]}}]",
+            "channel=[{},{volume={builtin=\"tomato:32\",spacing=[3,3,7]}}]",
         ],
     ),
 ];
+
+/// The name of the golden of a volume of colours, which is none of the builtin ones.
+const COLORS: &str = "colors-photo";
+
+/// A fruit of colours with a core, cut open, and its scene with the preset for photographs.
+fn colors() -> (Volume, Scene) {
+    let side = 40_u32;
+    let color = |index: u32| {
+        let place = UVec3::new(index % side, index / side % side, index / side / side).as_dvec3();
+        let from_center = (place - (f64::from(side) - 1.0) / 2.0) / (0.45 * f64::from(side));
+        let radius = from_center.length() * (1.0 + 0.1 * from_center.z.abs());
+        let rgb = match radius {
+            radius if radius > 1.0 => [0.0; 3],
+            radius if radius > 0.88 => [200.0 + 40.0 * from_center.z, 60.0 + 50.0 * (9.0 * from_center.x).sin(), 30.0],
+            radius if radius > 0.3 => [245.0, 235.0 - 30.0 * radius, 180.0],
+            _ => [120.0, 70.0, 30.0],
+        };
+        let [red, green, blue] = rgb.map(|number: f64| number.round() as f32);
+        [red, green, blue, 255.0]
+    };
+    let colors: Vec<[f32; 4]> = (0..side.pow(3)).map(color).collect();
+    let volume = Volume::from_colors("fruit", UVec3::splat(side), DVec3::ONE, (&colors, SampleType::U8)).unwrap();
+    let sets = [
+        "preset=photo",
+        "image={width=112,height=112}",
+        "camera={direction=[0.4,0.8,-0.4],height=46.0}",
+        "clip.planes=[[0,1,0.2,0]]",
+        "camera.fit=volume",
+    ]
+    .map(str::to_owned);
+    let mut scene = Scene::from_volume(VolumeSource::Memory, &sets).unwrap();
+    scene.splatting.opacity_threshold = OPACITY_THRESHOLD;
+    scene.splatting.classification = Classification::Before;
+    (volume, scene)
+}
 
 /// The scene of a row of [`SCENES`].
 fn scene((name, volume, settings): (&str, &str, &[&str])) -> Scene {
@@ -349,21 +388,53 @@ fn failures() -> PathBuf {
 fn the_native_backend_draws_the_goldens_byte_by_byte() {
     if let Bless::Names(names) = Bless::from_env().unwrap() {
         for name in names {
-            assert!(SCENES.iter().any(|scene| scene.0 == name), "{}: no scene \"{name}\"", Bless::VARIABLE);
+            let is_known = name == COLORS || SCENES.iter().any(|scene| scene.0 == name);
+            assert!(is_known, "{}: no scene \"{name}\"", Bless::VARIABLE);
         }
     }
     let cpu = Headless::new(&HeadlessOptions::default().with_backend(Backend::Cpu)).unwrap();
-    let check = |row: (&str, _, _)| {
-        let golden = golden!(row.0).unwrap().tolerance(Tolerance::EXACT).failures(failures().join("cpu"));
-        golden.check(&cpu.render(&scene(row)).unwrap()).err().map(|complaint| complaint.to_string())
+    let check = |name: &str, rendering: &Rendering| {
+        let golden = golden!(name).unwrap().tolerance(Tolerance::EXACT).failures(failures().join("cpu"));
+        golden.check(rendering).err().map(|complaint| complaint.to_string())
     };
-    let complaints: Vec<String> = SCENES.into_iter().filter_map(check).collect();
+    let of_row = |row: (&str, _, _)| check(row.0, &cpu.render(&scene(row)).unwrap());
+    let mut complaints: Vec<String> = SCENES.into_iter().filter_map(of_row).collect();
+    let (volume, photo) = colors();
+    complaints.extend(check(COLORS, &cpu.render_volume(volume, &photo).unwrap()));
     assert!(complaints.is_empty(), "{}", complaints.join("\n\n"));
+}
+
+/// If the environment names an instruction set, that one; under an emulator the others would take long.
+#[test]
+fn every_instruction_set_draws_the_goldens_byte_by_byte() {
+    let named = std::env::var_os("SHEETSPLAT_SIMD");
+    let levels: Vec<Simd> = (Simd::available().into_iter())
+        .filter(|level| named.as_ref().is_none_or(|name| name == level.name()))
+        .collect();
+    assert!(levels.len() >= if named.is_some() { 1 } else { 2 }, "only {levels:?}");
+    let mut complaints = Vec::new();
+    for row in SCENES {
+        let scene = scene(row);
+        let volume = scene.load_volume().unwrap();
+        let mut renderer = CpuRenderer::new(volume, &scene).unwrap();
+        let golden = Picture::open(&golden!(row.0).unwrap().path()).unwrap().image;
+        for &level in &levels {
+            renderer.set_simd(level).unwrap();
+            let rendering = renderer.draw().unwrap();
+            assert_eq!(rendering.stats.driver, level.name(), "{}", row.0);
+            let comparison = Comparison::new(&rendering.image, &golden, Tolerance::EXACT).unwrap();
+            if !comparison.passes() {
+                complaints.push(format!("{} with {}: {comparison}", row.0, level.name()));
+            }
+        }
+    }
+    assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
 
 #[test]
 fn every_golden_is_of_a_scene_small_and_made_by_the_native_backend() {
-    let paths = SCENES.map(|scene| golden!(scene.0).unwrap().path());
+    let names = SCENES.iter().map(|scene| scene.0).chain([COLORS]);
+    let paths: Vec<PathBuf> = names.map(|name| golden!(name).unwrap().path()).collect();
     for file in std::fs::read_dir(paths[0].parent().unwrap()).unwrap() {
         let path = file.unwrap().path();
         let shown = path.display();
@@ -386,7 +457,7 @@ mod gpu {
     use sheetsplat::scene::Scene;
     use sheetsplat::settings::{Classification, FootprintForm, Rasterizer};
 
-    use super::{SCENES, failures, scene};
+    use super::{COLORS, SCENES, colors, failures, scene};
 
     /// The steps of 255 by which a channel of the GPU's pictures may differ.
     const TOLERANCE: u8 = 3;
@@ -414,6 +485,11 @@ mod gpu {
             .unwrap_or_else(|error| panic!(".ci/setup --lavapipe installs what is missing: {error}"));
         let tolerance = Tolerance::new(TOLERANCE, OUTLIERS).unwrap();
         let mut complaints = Vec::new();
+        let (volume, photo) = colors();
+        let image = gpu.render_volume(volume, &photo).unwrap().image;
+        let golden = Picture::open(&golden!(COLORS).unwrap().path()).unwrap().image;
+        let comparison = Comparison::new(&image, &golden, tolerance).unwrap();
+        complaints.extend((!comparison.passes()).then(|| format!("{COLORS}: {comparison}")));
         for row in SCENES {
             let mut scene = scene(row);
             let golden = Picture::open(&golden!(row.0).unwrap().path()).unwrap().image;

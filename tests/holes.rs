@@ -9,15 +9,15 @@ use std::collections::BTreeMap;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::appearance::{Preset, categories, shown_range};
-use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::settings::{Camera, Compositing, LabelTables, Method, Projection, Ramp, Rasterizer, TransferFunction};
 use sheetsplat::volume::{Labels, Volume, builtin};
 
+use common::compare::assert_at_least;
 use common::images::{BLACK, psnr};
-use common::{COMPOSITINGS, RASTERIZERS, Random, camera, gpu, random_volume, scene, transfer};
+use common::{COMPOSITINGS, DRAWINGS, Drawing, RASTERIZERS, Random, camera, gpu, random_volume, scene, transfer};
 
 /// The possible samples of a hole.
 const HOLES: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
@@ -66,11 +66,9 @@ fn assert_finite(image: &Image, what: &str) {
 }
 
 /// The PSNR in dB of a frame against the f64 evaluation, over the pixels that show anything.
-fn decibels(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, what: &str) -> f64 {
-    let expected = reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap();
-    let actual = gpu.render_volume(volume.clone(), scene).unwrap().image;
-    assert_finite(&expected, what);
-    assert_finite(&actual, what);
+fn decibels(actual: &Image, expected: &Image, what: &str) -> f64 {
+    assert_finite(expected, what);
+    assert_finite(actual, what);
     psnr(&actual.pixels, &expected.pixels, BLACK, 300)
 }
 
@@ -141,10 +139,10 @@ fn volumes_with_holes_compare() {
 
 /// Compositing by amounts, with both projections and all methods.
 #[test]
-fn rasterizers_equal_the_reference() {
+fn frames_equal_the_reference() {
     let gpu = gpu();
     let mut random = Random(17);
-    let mut worst = [f64::INFINITY; 3];
+    let mut worst = [f64::INFINITY; 4];
     for (name, volume) in volumes(&mut random, [1.0, 1.0, 1.5]) {
         for (at, camera) in cameras().into_iter().enumerate() {
             for (compositing, method) in [
@@ -155,21 +153,24 @@ fn rasterizers_equal_the_reference() {
             ] {
                 let mut scene = translucent(camera);
                 (scene.splatting.compositing, scene.splatting.method) = (compositing, method);
-                let drawn = match method {
-                    Method::CompositeEverySample => vec![(2, Rasterizer::Auto, 90.0)],
-                    _ => vec![(0, Rasterizer::Quads, 90.0), (1, Rasterizer::Tiles, 109.0)],
+                let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+                let by_gpu = match method {
+                    Method::CompositeEverySample => vec![(2, Drawing::By(Rasterizer::Auto), 90.0)],
+                    _ => {
+                        let [quads, tiles] = RASTERIZERS.map(Drawing::By);
+                        vec![(0, quads, 90.0), (1, tiles, 109.0)]
+                    }
                 };
-                for (variant, rasterizer, required) in drawn {
-                    scene.splatting.rasterizer = rasterizer;
-                    let what = format!("{name}, camera {at}, {compositing:?}, {method:?}, {rasterizer:?}");
-                    let decibels = decibels(&gpu, &volume, &scene, &what);
+                for (variant, drawing, required) in by_gpu.into_iter().chain([(3, Drawing::Native, 110.0)]) {
+                    let what = format!("{name}, camera {at}, {compositing:?}, {method:?}, {drawing:?}");
+                    let decibels = decibels(&drawing.render(&gpu, &volume, &scene).image, &expected, &what);
                     worst[variant] = worst[variant].min(decibels);
-                    assert!(decibels >= required, "{what}: {decibels:.1} dB");
+                    assert_at_least(decibels, required, &what);
                 }
             }
         }
     }
-    println!("quads, tiles, samples: {worst:.1?} dB at worst");
+    println!("quads, tiles, samples, native: {worst:.1?} dB at worst");
 }
 
 /// Where nothing depends on gradients, a hole equals a hidden voxel: the bytes are the same for all compositings, with culling too.
@@ -203,18 +204,16 @@ fn a_hole_is_a_hidden_voxel() {
             };
             assert_finite(&twin(&volume, &scene), &what);
             assert!(twin(&volume, &scene) == twin(&filled, &hidden), "{what}: the twin");
-            for rasterizer in RASTERIZERS {
-                (scene.splatting.rasterizer, hidden.splatting.rasterizer) = (rasterizer, rasterizer);
-                let draw = |volume: &Volume, scene: &Scene| gpu.render_volume(volume.clone(), scene).unwrap();
-                let (drawn, expected) = (draw(&volume, &scene), draw(&filled, &hidden));
+            for drawing in DRAWINGS {
+                let (drawn, expected) = (drawing.render(&gpu, &volume, &scene), drawing.render(&gpu, &filled, &hidden));
                 assert_finite(&drawn.image, &what);
-                assert!(drawn.image == expected.image, "{what}, {rasterizer:?}");
-                assert_eq!(drawn.stats.counts, expected.stats.counts, "{what}, {rasterizer:?}");
+                assert!(drawn.image == expected.image, "{what}, {drawing:?}");
+                assert_eq!(drawn.stats.counts, expected.stats.counts, "{what}, {drawing:?}");
                 shown += usize::from(drawn.image.pixels.iter().any(|pixel| *pixel != BLACK));
             }
         }
     }
-    assert_eq!(shown, 2 * 2 * COMPOSITINGS.len());
+    assert_eq!(shown, 2 * DRAWINGS.len() * COMPOSITINGS.len());
 }
 
 /// A changed view equals a fresh one: no hole enters, whatever values take part.

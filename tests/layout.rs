@@ -105,7 +105,7 @@ fn shared() -> [Layout; 17] {
             tiles,
             per_unit,
             headlight,
-            last_label,
+            first_channel,
             value_offset,
             whole_values,
             channel_table,
@@ -122,9 +122,9 @@ fn shared() -> [Layout; 17] {
             value_scale,
             per_number,
             min_moment,
-            padding_0,
-            padding_1,
-            padding_2
+            channel,
+            colors,
+            padding_0
         }),
         layout!(FieldVoxel { x, y, depth, number, gradient_xy, gradient_z }),
         layout!(Brick { present, x, y, z, extent }),

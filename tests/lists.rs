@@ -18,7 +18,7 @@ use sheetsplat::internals::value_list::ValueList;
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::settings::Light;
 use sheetsplat::settings::{Camera, Projection};
-use sheetsplat::settings::{Compositing, FootprintForm, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{Classification, Compositing, FootprintForm, Method, Rasterizer, Splatting};
 use sheetsplat::settings::{Ramp, TransferFunction};
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::{Prepared, SceneView};
@@ -377,6 +377,45 @@ fn assert_costs(gpu: &GpuHeadless, rasterizer: Rasterizer) {
     assert!(renderer.prepare(gpu.device(), gpu.queue(), &mut view).is_err());
     view.set_image(image).unwrap();
     assert_fresh(gpu, &mut view, "after an error");
+}
+
+/// After splatting a changed transfer function tests bricks anew: the view equals a fresh one, and nothing is sorted where it shows the same bricks.
+#[test]
+fn after_splatting_a_changed_view_is_a_fresh_one() {
+    let gpu = gpu();
+    for rasterizer in RASTERIZERS {
+        let (volume, mut scene) = head();
+        (scene.splatting.rasterizer, scene.splatting.classification) = (rasterizer, Classification::After);
+        let mut view = gpu.view(volume, &scene).unwrap();
+        let prepare = |view: &mut SceneView| gpu.renderer().prepare(gpu.device(), gpu.queue(), view).unwrap().bucketed;
+        assert!(prepare(&mut view), "{rasterizer:?}: the first frame");
+        assert_fresh(&gpu, &mut view, "first");
+        let (mut changed, mut same) = (0, 0);
+        for (name, points) in [
+            ("other opacities of the same values", vec![(60.0, 0.0), (90.0, 0.2), (255.0, 0.9)]),
+            ("bone", vec![(190.0, 0.0), (220.0, 0.9)]),
+            ("fainter bone", vec![(190.0, 0.0), (240.0, 0.5)]),
+            ("a peak between values", vec![(99.0, 0.0), (100.5, 0.8), (102.0, 0.0)]),
+            ("everything", vec![(0.0, 0.01), (200.0, 0.5)]),
+            ("nothing", vec![(0.0, 0.0)]),
+            ("as at first", vec![(60.0, 0.0), (120.0, 0.6), (255.0, 1.0)]),
+        ] {
+            let old = view.volume().transfer().clone();
+            let transfer = TransferFunction { opacity: Ramp::new(points).unwrap(), ..old };
+            let touched = view.set_transfer_function(transfer).unwrap();
+            let name = format!("{rasterizer:?}: {name}");
+            let has_changed = touched.entered + touched.left > 0;
+            assert_eq!(prepare(&mut view), has_changed, "{name}: {touched:?}");
+            (changed, same) = (changed + u32::from(has_changed), same + u32::from(!has_changed));
+            assert_fresh(&gpu, &mut view, &name);
+        }
+        assert!(changed >= 4 && same >= 2, "{changed} {same}");
+        let color = Ramp::new(vec![(0.0, DVec3::new(1.0, 0.2, 0.1))]).unwrap();
+        let transfer = TransferFunction { color, ..view.volume().transfer().clone() };
+        assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched::default());
+        assert!(!prepare(&mut view), "{rasterizer:?}: a colour");
+        assert_fresh(&gpu, &mut view, "a colour");
+    }
 }
 
 /// A view that is empty at first.

@@ -5,21 +5,18 @@
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
-use std::sync::Arc;
-
 use sheetsplat::image::Image;
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::reference::composite::composite;
 use sheetsplat::internals::reference::footprint::Ray;
 use sheetsplat::internals::reference::{Buffer, Geometry, resolve, shading, sheets, splat};
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::Rasterizer;
 use sheetsplat::volume::{Volume, builtin};
 
 use common::compare::{self, assert_at_least};
 use common::images::color_rms;
 use common::shared::shared;
-use common::{camera, gpu, scene, transfer};
+use common::{DRAWINGS, Drawing, camera, gpu, scene, transfer};
 
 const FACTOR: u32 = 4;
 
@@ -48,17 +45,12 @@ fn decibels(a: &Image, b: &Image) -> f64 {
     compare::decibels(color_rms(a, b))
 }
 
-/// The PSNR in dB by rasterizer between a view at a quarter of its size and the box-filtered one; also the latter.
-fn by_rasterizer(volume: &Arc<Volume>, scene: &Scene) -> ([f64; 2], Image) {
+/// The PSNR in dB, by whatever draws, between a view at a quarter of its size and the box-filtered one; also the latter.
+fn by_all(volume: &Volume, scene: &Scene) -> ([f64; 3], Image) {
     let gpu = gpu();
-    let render = |scene: &Scene| gpu.render_volume(volume.clone(), scene).unwrap().image;
-    let filtered = box_filtered(&render(scene));
-    let by_both = [Rasterizer::Quads, Rasterizer::Tiles].map(|rasterizer| {
-        let mut small = minified(scene);
-        small.splatting.rasterizer = rasterizer;
-        decibels(&render(&small), &filtered)
-    });
-    (by_both, filtered)
+    let filtered = box_filtered(&Drawing::Native.render(&gpu, volume, scene).image);
+    let small = minified(scene);
+    (DRAWINGS.map(|drawing| decibels(&drawing.render(&gpu, volume, &small).image, &filtered)), filtered)
 }
 
 /// The f64 image of an orthographic view without the low-pass rule, with footprints of any size.
@@ -83,14 +75,14 @@ fn without_low_pass(volume: &Volume, scene: &Scene) -> Image {
 /// the filtered image without it, because the rule blurs slightly more than a box.)
 #[test]
 fn fine_structures() {
-    let volume = Arc::new(builtin::volume("nerve:160").unwrap());
+    let volume = builtin::volume("nerve:160").unwrap();
     let mut scene = scene(320, 320);
     scene.camera = camera([0.2, 0.9, -0.5], 960.0);
     scene.splatting.culling = false;
-    let (by_both, filtered) = by_rasterizer(&volume, &scene);
+    let (drawn, filtered) = by_all(&volume, &scene);
     let without = decibels(&without_low_pass(&volume, &minified(&scene)), &filtered);
-    println!("builtin:nerve:160: {by_both:.1?} dB, without the low-pass rule {without:.1} dB");
-    for decibels in by_both {
+    println!("builtin:nerve:160: {drawn:.1?} dB, without the low-pass rule {without:.1} dB");
+    for decibels in drawn {
         assert_at_least(decibels, 34.0, "fine structures");
         assert_at_least(decibels - without, 2.5, "what the low-pass rule gains");
     }
@@ -99,15 +91,15 @@ fn fine_structures() {
 /// A solid head and a translucent one.
 #[test]
 fn heads() {
-    let volume = Arc::new(builtin::volume("head:96").unwrap());
+    let volume = builtin::volume("head:96").unwrap();
     for (opacity, least) in [(1.0, 34.0), (0.05, 34.0)] {
         let mut scene = scene(320, 320);
         scene.camera.direction = glam::DVec3::new(0.4, 0.9, -0.3);
         scene.transfer =
             transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (60.0, opacity)]);
         scene.splatting.culling = false;
-        let (by_both, _) = by_rasterizer(&volume, &scene);
-        by_both.into_iter().for_each(|decibels| assert_at_least(decibels, least, format_args!("opacity {opacity}")));
+        let (drawn, _) = by_all(&volume, &scene);
+        drawn.into_iter().for_each(|decibels| assert_at_least(decibels, least, format_args!("opacity {opacity}")));
     }
 }
 
@@ -119,10 +111,10 @@ fn shared_ct_heads() {
         let mut scene = Scene::open(&shared(&format!("scenes/{name}.toml")), &[]).unwrap();
         // Culling would change the image within its bound.
         scene.splatting.culling = false;
-        let volume = Arc::new(scene.load_volume().unwrap());
-        let (by_both, filtered) = by_rasterizer(&volume, &scene);
+        let volume = scene.load_volume().unwrap();
+        let (drawn, filtered) = by_all(&volume, &scene);
         let without = decibels(&without_low_pass(&volume, &minified(&scene)), &filtered);
-        println!("{name}: {by_both:.1?} dB, without the low-pass rule {without:.1} dB");
-        by_both.into_iter().for_each(|decibels| assert_at_least(decibels, least, name));
+        println!("{name}: {drawn:.1?} dB, without the low-pass rule {without:.1} dB");
+        drawn.into_iter().for_each(|decibels| assert_at_least(decibels, least, name));
     }
 }

@@ -11,13 +11,14 @@ use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::Projection;
-use sheetsplat::settings::{Compositing, Order};
+use sheetsplat::settings::{Classification, Compositing, Gradient, Order, Projection, Ramp, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::compare::{assert_at_most, largest};
 use common::images::largest_difference;
-use common::{COMPOSITINGS, DRAWINGS, Drawing, F16, F32, Random, camera, drawn_forms, gpu, scene, transfer};
+use common::{
+    BY_AMOUNTS, COMPOSITINGS, DRAWINGS, Drawing, F16, F32, Random, camera, drawn_forms, gpu, scene, transfer,
+};
 
 fn render(drawing: Drawing, gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, u64) {
     let rendering = drawing.render(gpu, volume, scene);
@@ -266,6 +267,32 @@ fn every_run_gives_the_same_bytes() {
         assert_eq!(image.len(), 96 * 80 * 16);
         assert!(image == bytes(&first), "{compositing:?} {drawing:?} {form:?} {projection:?}, on the same device");
         assert!(image == bytes(&second), "{compositing:?} {drawing:?} {form:?} {projection:?}, on a new device");
+    }
+}
+
+/// Classified after splatting, too; by tiles where amounts add up.
+#[test]
+fn every_run_after_splatting_gives_the_same_bytes() {
+    let (volume, mut scene) = head();
+    scene.splatting.classification = Classification::After;
+    scene.transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (120.0, 0.9)]).unwrap());
+    let (first, second) = (gpu(), gpu());
+    let perspective = Projection::Perspective { fov_y: 60.0, distance: None, near: None };
+    let projections = [scene.camera.projection, perspective];
+    for (compositing, drawing) in COMPOSITINGS.into_iter().flat_map(|of| DRAWINGS.map(|drawing| (of, drawing))) {
+        if drawing == Drawing::By(Rasterizer::Tiles) && !BY_AMOUNTS.contains(&compositing) {
+            continue;
+        }
+        for (projection, gradient) in projections.into_iter().zip([Gradient::Differences, Gradient::Kernel]) {
+            (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
+            scene.shading.gradient = gradient;
+            let [one, again, elsewhere] =
+                [&first, &first, &second].map(|gpu| render(drawing, gpu, &volume, &scene).0.pixels);
+            let what = format!("{compositing:?} {drawing:?} {projection:?}");
+            assert!(one.iter().any(|pixel| *pixel != one[0]) || compositing == Compositing::Minimum, "{what}");
+            assert!(one == again, "{what}, on the same device");
+            assert!(one == elsewhere, "{what}, on a new device");
+        }
     }
 }
 

@@ -1,24 +1,22 @@
-//! Images against a dense ray march of the same pre-shaded field (`reference::ray_march`): those of the f64 evaluation, and the GPU's by each
-//! rasterizer. `cargo test --release --test ray_march -- --nocapture` prints the measurements.
+//! Images against a dense ray march of the same pre-shaded field (`reference::ray_march`): those of the f64 evaluation, the GPU's by each
+//! rasterizer, and the native backend's. `cargo test --release --test ray_march -- --nocapture` prints the measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
-use std::sync::Arc;
-
 use glam::{DVec3, UVec2};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, ray_march};
 use sheetsplat::scene::Scene;
+use sheetsplat::settings::Compositing;
 use sheetsplat::settings::Projection;
-use sheetsplat::settings::{Compositing, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::compare::assert_at_least;
 use common::images::{BLACK, psnr};
 use common::shared::shared;
-use common::{camera, gpu, scene, transfer};
+use common::{DRAWINGS, camera, gpu, scene, transfer};
 
 /// Some pixels of an image by the ray march.
 struct Marched {
@@ -47,20 +45,19 @@ fn twin(volume: &Volume, scene: &Scene) -> Image {
     reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
 }
 
-/// Asserts that the f64 evaluation and the GPU come as close to the march as required, in dB.
+/// Asserts that the f64 evaluation, the GPU and the native backend come as close to the march as required, in dB.
 fn assert_close(name: &str, volume: Volume, mut scene: Scene, stride: u32, required: f64) {
-    let volume = Arc::new(volume);
     let marched = Marched::new(&volume, &scene, stride);
     let by_twin = marched.psnr(&twin(&volume, &scene));
     let gpu = gpu();
-    let mut by = |rasterizer, culling| {
-        (scene.splatting.rasterizer, scene.splatting.culling) = (rasterizer, culling);
-        marched.psnr(&gpu.render_volume(volume.clone(), &scene).unwrap().image)
-    };
-    let [quads, tiles] =
-        [Rasterizer::Quads, Rasterizer::Tiles].map(|rasterizer| [false, true].map(|c| by(rasterizer, c)));
-    println!("{name}: twin {by_twin:.1} dB; without and with culling: quads {quads:.1?} dB, tiles {tiles:.1?} dB");
-    let all = [&[by_twin][..], &quads, &tiles].concat();
+    let drawn = DRAWINGS.map(|drawing| {
+        [false, true].map(|culling| {
+            scene.splatting.culling = culling;
+            marched.psnr(&drawing.render(&gpu, &volume, &scene).image)
+        })
+    });
+    println!("{name}: twin {by_twin:.1} dB; by {DRAWINGS:?}, without and with culling: {drawn:.1?} dB");
+    let all = [&[by_twin][..], drawn.as_flattened()].concat();
     all.iter().for_each(|&decibels| assert_at_least(decibels, required, name));
 }
 

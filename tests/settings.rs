@@ -8,14 +8,16 @@ mod common;
 use std::path::Path;
 
 use glam::{DVec3, UVec3};
+use sheetsplat::cpu::{self, CpuRenderer};
 use sheetsplat::headless::Error;
 use sheetsplat::internals::reference::{self, Host};
 use sheetsplat::scene::{Scene, SceneError};
 use sheetsplat::settings::{
-    Allowed, Clip, Compositing, Found, Interval, LabelTables, Light, Method, Order, Projection, Ramp, TransferFunction,
+    Allowed, Clip, Compositing, Economies, Found, Interval, LabelTables, Light, Method, Order, Projection, Ramp,
+    TransferFunction,
 };
 use sheetsplat::volume::{Grid, Volume, VolumeError, builtin};
-use sheetsplat::{Camera, Placement, RenderError, SceneView, SettingError};
+use sheetsplat::{Camera, Image, Placement, RenderError, SceneView, SettingError};
 
 use common::gpu;
 
@@ -182,6 +184,7 @@ fn invalid_values_have_the_same_key_everywhere() {
     let transfer = scene().transfer.resolve(&volume);
     let mut view = gpu.view(volume.clone(), &scene()).unwrap();
     let before = view.scene().clone();
+    let mut native = CpuRenderer::new(volume.clone(), &scene()).unwrap();
     for field in FIELDS {
         for value in field.bad() {
             let (key, scene) = (field.key, field.with(value));
@@ -201,6 +204,8 @@ fn invalid_values_have_the_same_key_everywhere() {
             };
             refused(gpu.view(volume.clone(), &scene).map(|_| ()));
             refused(gpu.render_volume(volume.clone(), &scene).map(|_| ()));
+            refused(cpu::render(volume.clone(), &scene).map(|_| ()));
+            refused(native.set_scene(&scene));
             refused(reference::render(&volume, &transfer, &scene).map(|_| ()));
             match gpu.render(&scene) {
                 Err(Error::Render(error)) => refused(Err(error)),
@@ -220,7 +225,7 @@ fn invalid_values_have_the_same_key_everywhere() {
             set_all(&mut view, &before, &transfer).unwrap();
         }
     }
-    assert_eq!(view.scene(), &before);
+    assert_eq!((view.scene(), native.scene()), (&before, &before));
 }
 
 #[test]
@@ -235,8 +240,17 @@ fn the_ends_of_ranges_are_allowed_and_drawn() {
             assert_eq!(field.parsed(value).unwrap(), scene, "{key} = {value}");
             set_all(&mut view, &scene, &scene.transfer.resolve(&volume)).unwrap();
             let drawn = gpu.draw(&mut view).unwrap_or_else(|error| panic!("{key} = {value}: {error}"));
-            let is_finite = drawn.image.pixels.iter().flatten().all(|channel| channel.is_finite());
-            assert!(is_finite, "{key} = {value}");
+            let is_finite = |image: &Image| image.pixels.iter().flatten().all(|channel| channel.is_finite());
+            assert!(is_finite(&drawn.image), "{key} = {value}");
+            match cpu::render(volume.clone(), &scene) {
+                Ok(drawn) => assert!(is_finite(&drawn.image), "{key} = {value} natively"),
+                // This backend has none of them.
+                Err(RenderError::OutOfRange(error)) => {
+                    assert_ne!(scene.splatting.experimental, Economies::default(), "{error}");
+                    assert_eq!(error.key, key);
+                }
+                Err(error) => panic!("{key} = {value} natively: {error}"),
+            }
         }
     }
 }
@@ -276,9 +290,12 @@ fn settings_that_exclude_each_other_have_the_same_key_everywhere() {
             Err(SceneError::Invalid { key, .. }) => assert_eq!(key, expected),
             other => panic!("{expected}: {other:?}"),
         }
-        match gpu.view(volume.clone(), &scene).map(|_| ()) {
-            Err(RenderError::OutOfRange(error)) => assert_eq!(error.key, expected),
-            other => panic!("{expected}: {other:?}"),
+        let by_both = [gpu.view(volume.clone(), &scene).map(|_| ()), cpu::render(volume.clone(), &scene).map(|_| ())];
+        for refused in by_both {
+            match refused {
+                Err(RenderError::OutOfRange(error)) => assert_eq!(error.key, expected),
+                other => panic!("{expected}: {other:?}"),
+            }
         }
         if scene.spacing.is_none() {
             let transfer = scene.transfer.resolve(&volume);
@@ -309,6 +326,14 @@ fn settings_only_hosts_have_are_checked() {
         assert!(view.set_iso_ranges(Some(ranges)).unwrap_err().key.starts_with("transfer.iso_ranges"));
     }
     assert_eq!(view.scene(), &before);
+    let mut native = CpuRenderer::new(volume.clone(), &scene()).unwrap();
+    for angle in NOT_FINITE {
+        assert_eq!(native.turn(angle).unwrap_err().key, "degrees");
+    }
+    for opacity in NOT_FINITE.iter().chain(THRESHOLD) {
+        assert_eq!(native.set_first_hit(Some(*opacity)).unwrap_err().key, "first_hit");
+    }
+    assert_eq!(native.scene(), &before);
     let transfer = scene().transfer.resolve(&volume);
     for (surfaces, key) in [(vec![1.0; 24 * 18 - 1], "surfaces"), (vec![NAN; 24 * 18], "surfaces[0]")] {
         let host = Host { surfaces: Some(&surfaces), first_hit: None };

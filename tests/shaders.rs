@@ -78,7 +78,7 @@ fn errors_name_the_file_and_the_line() {
         broken.explain("at wgsl:4:7, and wgsl:1:2"),
         "at shaders/broken.wgsl:2:7, and shaders/shared/one.wgsl:1:2"
     );
-    for shader in &shaders::ALL {
+    for shader in shaders::ALL {
         // Every file ends with a line break, or else lines would be counted wrongly.
         assert!(shader.files.iter().all(|(_, text)| text.ends_with('\n')), "{}", shader.stage);
     }
@@ -109,7 +109,7 @@ fn entry_points_and_overrides_are_those_of_the_passes() {
     // Classify has the bindings and constants of composite, and its own.
     let composite = std::fs::read_to_string(root().join("src/pass/composite.rs")).unwrap();
     let mut failures = Vec::new();
-    for shader in &shaders::ALL {
+    for shader in shaders::ALL {
         let (module, _) = validated(shader).unwrap();
         let constant = format!("shaders::{}", shader.stage.to_uppercase());
         let is_name = |c: char| c.is_alphanumeric() || c == '_';
@@ -159,7 +159,7 @@ fn bindings_stay_within_default_limits() {
     let limits = wgpu::Limits::default();
     assert_eq!(limits.max_storage_buffers_per_shader_stage, 8, "WebGPU's default");
     let mut failures = Vec::new();
-    for shader in &shaders::ALL {
+    for shader in shaders::ALL {
         let (module, _) = validated(shader).unwrap();
         let globals = || module.global_variables.iter().map(|(_, global)| global);
         // A layout may make every binding visible to every stage, so all of them count for each.
@@ -225,7 +225,7 @@ fn bindings_stay_within_default_limits() {
 fn entry_points_stay_within_default_limits() {
     let limits = wgpu::Limits::default();
     let mut failures = Vec::new();
-    for shader in &shaders::ALL {
+    for shader in shaders::ALL {
         let (module, _) = validated(shader).unwrap();
         for entry in &module.entry_points {
             let [x, y, z] = workgroup_size(&module, entry);

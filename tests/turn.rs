@@ -9,10 +9,11 @@ mod common;
 use std::sync::Arc;
 
 use glam::DVec3;
-use sheetsplat::headless::GpuHeadless;
+use sheetsplat::cpu::CpuRenderer;
+use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::Method;
-use sheetsplat::volume::{Volume, builtin};
+use sheetsplat::settings::{Camera, Method};
+use sheetsplat::volume::builtin;
 
 use common::compare::{assert_at_least, largest};
 use common::{gpu, scene, transfer};
@@ -22,15 +23,13 @@ const ANGLES: [f64; 8] = [0.0, 15.0, 30.0, 44.5, 45.0, 60.0, 75.0, 89.5];
 const STEP: f64 = 0.5;
 
 /// The largest change of the image's mean brightness over a step.
-fn largest_change(gpu: &GpuHeadless, volume: &Arc<Volume>, scene: &Scene) -> f64 {
-    let mut view = gpu.view(volume.clone(), scene).unwrap();
+fn largest_change(mut draw: impl FnMut(Camera) -> Image, scene: &Scene) -> f64 {
     let mut brightness = |degrees: f64| {
         let mut camera = scene.camera;
         let (sine, cosine) = degrees.to_radians().sin_cos();
         camera.direction = DVec3::new(sine, 0.0, cosine);
         camera.up = DVec3::Y;
-        view.set_camera(camera).unwrap();
-        let image = gpu.draw(&mut view).unwrap().image;
+        let image = draw(camera);
         let sum: f64 = image.pixels.iter().flat_map(|pixel| pixel[..3].iter()).map(|&c| f64::from(c)).sum();
         sum / (3 * image.pixels.len()) as f64
     };
@@ -43,10 +42,27 @@ fn image_aligned_sheets_do_not_pop() {
     let volume = Arc::new(builtin::volume("nerve:256").unwrap());
     let mut scene = scene(128, 128);
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(30.0, 0.0), (90.0, 0.2)]);
-    let [image_aligned, axis_aligned] = [Method::ImageAligned, Method::AxisAligned].map(|method| {
+    let changes = [Method::ImageAligned, Method::AxisAligned].map(|method| {
         scene.splatting.method = method;
-        largest_change(&gpu, &volume, &scene)
+        let mut view = gpu.view(volume.clone(), &scene).unwrap();
+        let mut native = CpuRenderer::new(volume.clone(), &scene).unwrap();
+        let by_gpu = |camera| {
+            view.set_camera(camera).unwrap();
+            gpu.draw(&mut view).unwrap().image
+        };
+        let natively = |camera| {
+            native.set_camera(camera).unwrap();
+            native.draw().unwrap().image
+        };
+        [largest_change(by_gpu, &scene), largest_change(natively, &scene)]
     });
-    println!("{image_aligned:.2e}, {axis_aligned:.2e}, {:.1}", axis_aligned / image_aligned);
-    assert_at_least(axis_aligned / image_aligned, 15.0, "how much more axis-aligned sheets pop");
+    for (at, name) in ["GPU", "native"].into_iter().enumerate() {
+        let [image_aligned, axis_aligned] = changes.map(|change| change[at]);
+        println!("{name}: {image_aligned:.2e}, {axis_aligned:.2e}, {:.1}", axis_aligned / image_aligned);
+        assert_at_least(
+            axis_aligned / image_aligned,
+            15.0,
+            format_args!("{name}: how much more axis-aligned sheets pop"),
+        );
+    }
 }

@@ -75,6 +75,53 @@ fn the_window_shows_the_rendering_and_the_panel() {
     assert!(skin > 0.001, "and the colours of the transfer function: {skin}");
 }
 
+/// Two channels, with a camera that does not depend on the window.
+const CHANNELS: &str = "
+    shading.enabled = false
+    splatting.compositing = 'exponential'
+    [camera]
+    direction = [0.55, 0.8, -0.12]
+    [image]
+    background = [0, 0, 0.4, 1]
+    [[channel]]
+    name = 'soft'
+    volume.builtin = 'head:48'
+    transfer = {color = [[0, [1, 0, 1]]], opacity = [[20, 0], [60, 0.03]]}
+    [[channel]]
+    name = 'hard'
+    volume.builtin = 'head:48'
+    transfer = {color = [[0, [0, 1, 0]]], opacity = [[150, 0], [200, 0.2]]}
+";
+
+#[test]
+fn the_panel_lists_channels_in_their_colours() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("two.toml"), CHANNELS).unwrap();
+    let [width, height] = WINDOW;
+    let picture = width - PANEL;
+    let mut pictures = Vec::new();
+    for (name, set) in [("both", ""), ("hard", " --set channel[0].visible=false")] {
+        let view = format!("view two.toml{set} --size {width}x{height} --screenshot {name}.png");
+        succeeds(sheetsplat(folder.path(), &view));
+        let window = open(folder.path(), &format!("{name}.png"));
+        let size = format!("--set image.width={picture} --set image.height={height}");
+        succeeds(sheetsplat(folder.path(), &format!("render two.toml{set} {size} -o image.png")));
+        let image = open(folder.path(), "image.png");
+        let differing = image
+            .enumerate_pixels()
+            .filter(|(x, y, pixel)| x + 2 < picture && difference(pixel, window.get_pixel(*x, *y)) > 1);
+        assert_eq!(differing.count(), 0, "{name}");
+        // Hidden channels are listed too, each with its name and a field in its colour.
+        let panel = image::imageops::crop_imm(&window, picture + 2, 0, PANEL - 2, height).to_image();
+        let count = |is: fn(&&Rgba<u8>) -> bool| panel.pixels().filter(is).count();
+        let magenta = count(|pixel| pixel[0] > 200 && pixel[1] < 60 && pixel[2] > 200);
+        let green = count(|pixel| pixel[0] < 60 && pixel[1] > 200 && pixel[2] < 60);
+        assert!(magenta > 150 && green > 150, "{name}: {magenta} magenta pixels, {green} green ones");
+        pictures.push(image);
+    }
+    assert!(pictures[0] != pictures[1]);
+}
+
 #[test]
 fn failures_end_with_a_message() {
     let folder = tempfile::tempdir().unwrap();

@@ -28,9 +28,6 @@ from .scene import Scene
 from .view import View, info, orbit, render, sweep
 from .volume import Volume
 
-if TYPE_CHECKING:
-    from .widget import Widget as Widget
-
 __all__ = [
     "Comparison",
     "DeviceError",
@@ -56,13 +53,17 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
-    # Only the widget needs anywidget.
-    if name == "Widget":
-        from .widget import Widget
+if TYPE_CHECKING:
+    from .widget import Widget as Widget
+else:
+    # Type checkers would take any name for one of this module.
+    def __getattr__(name: str) -> Any:
+        # Only the widget needs anywidget.
+        if name == "Widget":
+            from .widget import Widget
 
-        return Widget
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+            return Widget
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

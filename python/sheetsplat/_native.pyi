@@ -4,6 +4,31 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "BytesRead",
+    "Comparison",
+    "Part",
+    "Scene",
+    "View",
+    "Volume",
+    "check_format",
+    "check_golden",
+    "check_sizes",
+    "compare",
+    "elevation_and_center",
+    "encode",
+    "merge",
+    "open_image",
+    "panned",
+    "pixel",
+    "placed",
+    "presets",
+    "save",
+    "split",
+    "with_camera",
+    "write",
+]
+
 @final
 class BytesRead:
     def __new__(cls) -> BytesRead: ...
@@ -19,6 +44,7 @@ class Volume:
         labels: NDArray[Any] | None = None,
         axes: list[list[float]] | None = None,
         origin: list[float] = ...,
+        memory: str | None = None,
     ) -> Volume: ...
     @staticmethod
     def open(
@@ -27,12 +53,14 @@ class Volume:
         selection: list[int | None],
         scene: Scene | None,
         bytes_read: BytesRead | None,
+        changes: tuple[tuple[float, float, float] | None, NDArray[Any] | None] | None = None,
         index: str | PathLike[str] | None = None,
     ) -> Volume: ...
-    @staticmethod
-    def builtin(name: str) -> Volume: ...
     def replaced(
-        self, spacing: tuple[float, float, float] | None = None, labels: NDArray[Any] | None = None
+        self,
+        spacing: tuple[float, float, float] | None = None,
+        labels: NDArray[Any] | None = None,
+        memory: str | None = None,
     ) -> Volume: ...
     @property
     def shape(self) -> list[int]: ...
@@ -126,6 +154,8 @@ def check_golden(
     made_on: tuple[str, str] | None,
     tolerance: tuple[int, float] | None,
 ) -> tuple[bool, str | None]: ...
+def check_sizes(shape: list[int], channels: int, labels: bool, memory: str | None) -> None: ...
+def write(path: str | PathLike[str], bytes: bytes) -> None: ...
 def check_format(path: str | PathLike[str]) -> None: ...
 def save(array: NDArray[np.float32], path: str | PathLike[str], depth: int) -> None: ...
 def encode(array: NDArray[np.float32], depth: int) -> bytes: ...

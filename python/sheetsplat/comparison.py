@@ -6,19 +6,29 @@ import os
 from typing import Any
 
 from . import _native as native
+from ._checks import finite, whole
+from .errors import GoldenError
 from .image import Image
 
 __all__ = ["Comparison", "compare"]
 
 
 class Comparison:
-    """The differences between two pictures of equal size. `str` gives a report of several lines.
+    """The differences between two pictures of equal size, which `compare` finds. `str` gives a report of several lines.
 
     Channels are compared as 8-bit numbers, as in a PNG, but premultiplied by alpha.
     """
 
-    def __init__(self, differences: native.Comparison) -> None:
-        self._native = differences
+    _native: native.Comparison
+
+    def __init__(self) -> None:
+        raise TypeError("comparisons are made by compare")
+
+    @classmethod
+    def _of(cls, differences: native.Comparison) -> Comparison:
+        comparison = cls.__new__(cls)
+        comparison._native = differences
+        return comparison
 
     @property
     def passes(self) -> bool:
@@ -32,7 +42,7 @@ class Comparison:
 
     @property
     def worst(self) -> tuple[int, ...]:
-        """x and y of the pixel with the largest difference."""
+        """The pixel with the largest difference: x and y."""
         return tuple(self._native.worst)
 
     @property
@@ -70,6 +80,18 @@ def compare(actual: Any, expected: Any, *, per_channel: int = 3, outliers: float
     outliers : float
         The fraction of pixels that may differ by more, at most 0.01.
 
+    Returns
+    -------
+    Comparison
+        The differences, and whether the tolerance allows them.
+
+    Raises
+    ------
+    GoldenError
+        If the tolerance would allow visible differences.
+    ImageError
+        If the pictures are not of one size, or something is no picture.
+
     Examples
     --------
     >>> import numpy as np
@@ -77,8 +99,15 @@ def compare(actual: Any, expected: Any, *, per_channel: int = 3, outliers: float
     >>> compare(black, black).passes, compare(black, white).max
     (True, (255, 255, 255, 0))
     """
+    tolerance = _tolerance(per_channel, outliers)
     pictures = [_picture(picture)._array for picture in (actual, expected)]
-    return Comparison(native.compare(pictures[0], pictures[1], per_channel, outliers))
+    return Comparison._of(native.compare(pictures[0], pictures[1], *tolerance))
+
+
+def _tolerance(per_channel: int, outliers: float) -> tuple[int, float]:
+    """A tolerance as the native part takes it, which also refuses what is lax."""
+    steps = whole("tolerance per channel", per_channel, 0, 16, GoldenError)
+    return steps, finite("share of outliers", outliers, GoldenError)
 
 
 def _picture(picture: Any) -> Image:

@@ -24,11 +24,11 @@ from typing import Any
 import dask
 from distributed import Client, Future, default_client, get_worker
 
-from .errors import SceneError
+from ._checks import finite, whole
 from .image import Image
 from .part import Part, merge
 from .scene import Scene
-from .view import View, _frames, _is_scene_file, _opened
+from .view import View, _check_single, _frames, _is_scene_file, _opened
 from .volume import _BUILTIN, Volume
 
 __all__ = ["orbit", "render"]
@@ -116,10 +116,15 @@ def orbit(
         As for `View.orbit`.
     parts : int
         The number of parts of each picture; 1 is best where there are more pictures than workers.
+
+    Returns
+    -------
+    list of distributed.Future
+        The pictures, as for `render`.
     """
     client = client or default_client()
     what, look = _sent(client, source, spacing, labels, scene, settings, memory, index)
-    numbers, count_of_parts = _frames(count, frames), _count(client, parts)
+    numbers, count_of_parts, turn = _frames(count, frames), _count(client, parts), finite("turn", turn)
     start = _prepare(what, look, side, backend, True)
     pictures = [_picture(what, start, turn / count * frame, count_of_parts, backend) for frame in numbers]
     futures: list[Future] = client.compute(pictures, retries=3)
@@ -165,8 +170,7 @@ def _sent(
     if isinstance(source, Volume):
         raise TypeError("a volume is not sent to other processes; give its path or its array")
     if isinstance(source, Scene) or _is_scene_file(source):
-        if scene is not None:
-            raise TypeError("the source is a scene; give either it or `scene`")
+        _check_single(scene)
         look = source = Scene(source, **settings)
     else:
         look = Scene(scene, **settings)
@@ -182,9 +186,7 @@ def _count(client: Client, parts: int | None) -> int:
     if parts is None:
         threads: dict[str, int] = client.nthreads()
         return max(1, 2 * sum(threads.values()))
-    if parts < 1:
-        raise SceneError(f"parts: found {parts}, allowed: at least 1", "parts", str(parts), "at least 1")
-    return parts
+    return whole("parts", parts, 1, 2**31 - 1)
 
 
 def _prepare(what: Any, look: Scene, side: str | None, backend: str, all_around: bool) -> Any:

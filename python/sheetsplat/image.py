@@ -6,7 +6,8 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from . import _native
-from .errors import ImageError
+from ._checks import refused
+from .errors import ImageError, SceneError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -23,8 +24,9 @@ class Image:
     Parameters
     ----------
     array : array or Image
-        Height × width × 3 or 4: floating-point numbers, premultiplied by alpha, or 8-bit or 16-bit integers with
-        straight alpha, as in a PNG. Three channels are opaque.
+        Height × width × 3 or 4, with any strides: floating-point numbers, premultiplied by alpha; or integers with
+        straight alpha, as in a PNG: ``uint16`` from 0 to 65535, and integers of any other type from 0 to 255. Three
+        channels are opaque.
 
     Attributes
     ----------
@@ -58,7 +60,25 @@ class Image:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> Image:
-        """Opens a PNG, EXR or NPY file."""
+        """Opens a PNG, EXR or NPY file.
+
+        Parameters
+        ----------
+        path : path
+            The file.
+
+        Returns
+        -------
+        Image
+            The picture. It knows whether the native backend made it, if the file says so.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        ImageError
+            If it holds no picture.
+        """
         array, made_on = _native.open_image(path)
         return cls._of(array, {}, made_on)
 
@@ -106,7 +126,16 @@ class Image:
             ``.png`` (straight alpha), ``.exr`` or ``.npy`` (both ``float32``, premultiplied).
         depth : {8, 16}
             Bits per channel of a PNG.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written; then nothing is left of it.
+        ImageError
+            If the extension is another one.
         """
+        if depth not in (8, 16):
+            raise refused(SceneError, "depth", repr(depth), "8 or 16 bits per channel")
         _native.save(self._array, path, depth)
 
     def _repr_png_(self) -> bytes:
@@ -119,19 +148,27 @@ class Image:
 def _premultiplied(source: Any) -> NDArray[np.float32]:
     import numpy as np
 
-    array = np.asarray(source)
+    try:
+        array = np.asarray(source)
+    except Exception as error:
+        # Whatever a tensor on a GPU, or another library's array, raises.
+        found = f"{type(error).__name__}: {error}"
+        raise refused(ImageError, "image", found, "an array of height × width × 3 or 4") from error
     if array.ndim != 3 or array.shape[2] not in (3, 4) or 0 in array.shape:
         shape = "×".join(map(str, array.shape))
-        raise ImageError(f"image: found the shape {shape}, allowed: height × width × 3 or 4", "image", shape)
-    if array.dtype in (np.uint8, np.uint16):
-        channels = array.astype(np.float32) / np.float32(np.iinfo(array.dtype).max)
-        is_straight = True
+        raise refused(ImageError, "image", f"the shape {shape}", "height × width × 3 or 4")
+    is_straight = array.dtype.kind in "iu"
+    if is_straight:
+        full = 65535 if array.dtype == np.uint16 else 255
+        low, high = int(array.min()), int(array.max())
+        if low < 0 or high > full:
+            found = f"{array.dtype} from {low} to {high}"
+            raise refused(ImageError, "image", found, "uint16, other integers from 0 to 255, or floating-point numbers")
+        channels = array.astype(np.float32) / np.float32(full)
     elif array.dtype.kind == "f":
         channels = array.astype(np.float32)
-        is_straight = False
     else:
-        allowed = "uint8, uint16 or floating-point numbers"
-        raise ImageError(f"image: found {array.dtype}, allowed: {allowed}", "image", str(array.dtype), allowed)
+        raise refused(ImageError, "image", str(array.dtype), "integers or floating-point numbers")
     if channels.shape[2] == 3:
         opaque = np.ones((*channels.shape[:2], 1), dtype=np.float32)
         return np.concatenate([channels, opaque], axis=2)

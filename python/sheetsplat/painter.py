@@ -53,12 +53,24 @@ class Painter:
         self._seconds = 0.0
 
     def prepare(self, scene: Scene) -> None:
-        """Changes what the view shows, so that an error of the settings is raised here; then nothing changes."""
+        """Changes what the view shows, so that an error of the settings is raised here; then nothing changes.
+
+        Parameters
+        ----------
+        scene : Scene
+            What it shows.
+        """
         with self._drawing:
             self._view.scene = scene
 
     def ask(self, scene: Scene) -> None:
-        """Has a scene drawn, in place of those asked for before."""
+        """Has a scene drawn, in place of those asked for before.
+
+        Parameters
+        ----------
+        scene : Scene
+            What is drawn.
+        """
         with self._changed:
             self._wanted, self._result = scene, None
             self._changed.notify_all()

@@ -35,7 +35,13 @@ class Part:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> Part:
-        """Opens a part that `save` or ``sheetsplat render`` wrote: an EXR or NPZ file."""
+        """Opens a part that `save` or ``sheetsplat render`` wrote.
+
+        Parameters
+        ----------
+        path : path
+            An EXR or NPZ file.
+        """
         return cls._of(native.Part.open(path), {})
 
     @classmethod
@@ -45,6 +51,11 @@ class Part:
         `merge` takes it for them. It merges neighbours in pairs, again and again: whoever joins the same pairs gets
         the same bytes.
 
+        Parameters
+        ----------
+        parts : iterable of Part
+            The parts, in any order.
+
         Raises
         ------
         MergeError
@@ -53,7 +64,13 @@ class Part:
         return cls._of(native.Part.join([part._native for part in parts]), {})
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Saves the part as ``.exr`` or ``.npz``, which ``sheetsplat merge`` takes, too."""
+        """Saves the part as a file that ``sheetsplat merge`` takes, too.
+
+        Parameters
+        ----------
+        path : path
+            ``.exr`` or ``.npz``.
+        """
         self._native.save(path)
 
     @property
@@ -83,6 +100,16 @@ def merge(parts: Iterable[Part]) -> Image:
 
     The picture is that of the whole scene: to rounding with ``splatting.opacity_threshold = 1``, and with a threshold T
     to 1 - T of the picture without culling.
+
+    Parameters
+    ----------
+    parts : iterable of Part
+        All parts.
+
+    Returns
+    -------
+    Image
+        The picture.
 
     Raises
     ------

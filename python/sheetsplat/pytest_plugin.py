@@ -7,7 +7,8 @@ Rust macro ``assert_golden!``::
         golden(sheetsplat.render("builtin:head:48"), "head")
 
 ``SHEETSPLAT_BLESS=all pytest``, or the names of goldens separated by commas, makes a picture the golden if it fails or
-has no golden yet. The files of a failure lie under ``--golden-output``, with a page ``index.html`` of all of them.
+has no golden yet. The files of a failure lie under ``--golden-output``, with a page ``index.html`` of all of them, whether
+one process ran the tests or the workers of pytest-xdist did.
 """
 
 from __future__ import annotations
@@ -16,16 +17,25 @@ import html
 import os
 import shutil
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 
+#: What a worker of pytest-xdist sends its controller at its end, by this name.
+_SENT = "sheetsplat_golden_failures"
+
+
+class _Failure(NamedTuple):
+    """A golden that failed; texts alone, so that it can be sent to another process."""
+
+    name: str
+    test: str
+    golden: str
+    left_in: str
+    report: str
+
+
 _FAILURES = pytest.StashKey["list[_Failure]"]()
-
-
-class _Failure:
-    def __init__(self, name: str, test: str, golden: Path, left_in: Path, report: str) -> None:
-        self.name, self.test, self.golden, self.left_in, self.report = name, test, golden, left_in, report
 
 
 class Golden:
@@ -50,7 +60,8 @@ class Golden:
         Parameters
         ----------
         image : Image or array
-            An `Image`, or any array of height × width × 3 or 4, as `Image` takes it.
+            An `Image`, or any array of height × width × 3 or 4 that `Image` takes: floating-point numbers, ``uint16``,
+            and other integers from 0 to 255, with any strides.
         name : str
             The golden's name.
         per_channel : int, optional
@@ -58,13 +69,23 @@ class Golden:
             must equal goldens of the native backend, and others may differ by 3.
         outliers : float
             The fraction of pixels that may differ by more, at most 0.01.
+
+        Raises
+        ------
+        GoldenError
+            If the name is none of a file, the tolerance would allow visible differences, or ``SHEETSPLAT_BLESS`` is
+            invalid.
+        ImageError
+            If something is no picture.
         """
         __tracebackhide__ = True
         from . import _native
+        from .comparison import _tolerance
         from .image import Image
 
         picture = Image(image)
-        tolerance = None if per_channel is None and outliers == 0.0 else (3 if per_channel is None else per_channel, outliers)
+        is_default = per_channel is None and outliers == 0.0
+        tolerance = None if is_default else _tolerance(3 if per_channel is None else per_channel, outliers)
         blessed, report = _native.check_golden(
             name, self._folder, self._output, picture._array, picture._made_on, tolerance
         )
@@ -72,7 +93,7 @@ class Golden:
             print(f"blessed {self._folder / name}.png")
         if report is not None:
             golden = self._folder / f"{name}.png"
-            self._failures.append(_Failure(name, self._test, golden, self._output, report))
+            self._failures.append(_Failure(name, self._test, str(golden), str(self._output), report))
             pytest.fail(report, pytrace=False)
 
 
@@ -103,8 +124,20 @@ def golden(request: pytest.FixtureRequest) -> Golden:
     return Golden(path.parent / "goldens", output, request.node.nodeid, request.config.stash[_FAILURES])
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node: Any, error: object) -> None:
+    """Takes over the failures of a worker of pytest-xdist. One that was killed sends none."""
+    sent = getattr(node, "workeroutput", {}).get(_SENT, [])
+    node.config.stash[_FAILURES] += [_Failure(*failure) for failure in sent]
+
+
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    output, failures = _output(session.config), session.config.stash[_FAILURES]
+    config = session.config
+    output, failures = _output(config), config.stash[_FAILURES]
+    if hasattr(config, "workeroutput"):
+        # The controller makes the page, which shows the failures of all workers.
+        config.workeroutput[_SENT] = [tuple(failure) for failure in failures]
+        return
     page = output / "index.html"
     if failures:
         output.mkdir(parents=True, exist_ok=True)
@@ -134,10 +167,10 @@ img {{ image-rendering: pixelated; max-width: 30vw; background: #888; }}
 
 
 def _section(failure: _Failure, output: Path) -> str:
-    left = failure.left_in
+    left = Path(failure.left_in)
     # The page stays complete when the folder is copied elsewhere, for instance from a CI run.
     copy = left / f"{failure.name}-golden.png"
-    if failure.golden.exists():
+    if Path(failure.golden).exists():
         shutil.copyfile(failure.golden, copy)
     kinds = {"golden": copy, "actual": left / f"{failure.name}-actual.png", "difference": left / f"{failure.name}-difference.png"}
     figures = "\n".join(

@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from . import _native as native
+from ._checks import finite, refused
 from ._loading import loading
+from .errors import FileError, SceneError
 from .volume import Volume, _memory
 
 __all__ = ["Scene"]
@@ -59,8 +61,10 @@ class Scene:
             settings = {**_flat(source or {}), **_flat(settings)}
         elif isinstance(source, str) and ("\n" in source or "=" in source):
             text, origin, folder = source, "scene", "."
-        else:
+        elif isinstance(source, (str, os.PathLike)):
             text, origin, folder = _read(os.fspath(source))
+        else:
+            raise refused(SceneError, "scene", type(source).__name__, "a text, a path, a mapping or a Scene")
         self._native = native.Scene(text, origin, folder, settings)
 
     @classmethod
@@ -70,7 +74,18 @@ class Scene:
         return scene
 
     def replace(self, **settings: Any) -> Scene:
-        """The same scene with other settings over it; this one does not change."""
+        """The same scene with other settings over it; this one does not change.
+
+        Parameters
+        ----------
+        **settings
+            The settings, as for `Scene`.
+
+        Returns
+        -------
+        Scene
+            The other scene.
+        """
         return Scene(self, **settings)
 
     @property
@@ -85,7 +100,18 @@ class Scene:
         progress: bool = True,
         index: str | os.PathLike[str] | None = None,
     ) -> Volume:
-        """Opens the volume that the scene names; `memory`, `progress` and `index` are as for `Volume`."""
+        """Opens the volume that the scene names.
+
+        Parameters
+        ----------
+        memory, progress, index
+            As for `Volume`.
+
+        Returns
+        -------
+        Volume
+            The volume.
+        """
         with loading(None, progress) as bytes_read:
             return Volume._of(self._native.load_volume(_memory(memory), bytes_read, index))
 
@@ -98,12 +124,28 @@ class Scene:
             The volume that determines the transfer function and the camera's position.
         all_around : bool
             Place the camera so that the object stays in the picture at constant size while the camera turns.
+
+        Returns
+        -------
+        Scene
+            The scene, which draws the same picture wherever its volume is drawn.
         """
         return Scene._of(self._native.explicit(volume._native, all_around))
 
     def turned(self, degrees: float) -> Scene:
-        """The scene with its camera turned right-handed about ``camera.up``."""
-        return Scene._of(self._native.turned(degrees))
+        """The scene with its camera turned about ``camera.up``.
+
+        Parameters
+        ----------
+        degrees : float
+            The angle, right-handed.
+
+        Returns
+        -------
+        Scene
+            The other scene.
+        """
+        return Scene._of(self._native.turned(finite("turn", degrees)))
 
     def seen_from(self, volume: Volume, side: str) -> Scene:
         """The scene with its camera on a side of the patient.
@@ -114,11 +156,27 @@ class Scene:
             A volume that says how the patient lies.
         side : str
             ``"front"``, ``"back"``, ``"left"``, ``"right"``, ``"top"`` or ``"bottom"``.
+
+        Returns
+        -------
+        Scene
+            The other scene.
         """
         return Scene._of(self._native.seen_from(volume._native, side))
 
     def to_toml(self, folder: str | os.PathLike[str] = ".") -> str:
-        """The text of a scene file in a folder, to which paths in it are relative."""
+        """The text of a scene file.
+
+        Parameters
+        ----------
+        folder : path
+            The folder of the file, to which paths in it are relative.
+
+        Returns
+        -------
+        str
+            The text.
+        """
         return self._native.to_toml(folder)
 
     def to_dict(self) -> dict[str, Any]:
@@ -126,9 +184,20 @@ class Scene:
         return tomllib.loads(self.to_toml())
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes a scene file."""
+        """Writes a scene file, whole or not at all.
+
+        Parameters
+        ----------
+        path : path
+            The file. Paths in it are relative to its folder.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written.
+        """
         target = Path(path)
-        target.write_text(self.to_toml(target.parent), encoding="utf-8")
+        native.write(target, self.to_toml(target.parent).encode())
 
     def __reduce__(self) -> Any:
         folder = os.getcwd()
@@ -160,8 +229,6 @@ def _flat(table: Mapping[Any, Any], path: str = "") -> dict[Any, Any]:
 
 
 def _read(path: str) -> tuple[str, str, str]:
-    from .errors import FileError, SceneError
-
     try:
         text = Path(path).read_text(encoding="utf-8")
     except UnicodeDecodeError as error:

@@ -6,15 +6,17 @@ import itertools
 import json
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
+from . import _movies as movies
 from . import _native as native
-from .errors import SceneError
+from ._checks import finite, refused, whole
+from .errors import ImageError, SceneError
 from .image import Image
 from .part import Part, merge
 from .scene import Scene
-from .volume import Volume, _open
+from .volume import Volume, _open, _spacing
 
 __all__ = ["View", "info", "orbit", "render", "sweep"]
 
@@ -24,8 +26,10 @@ _SCENE_FILE = ".toml"
 class View:
     """A view of a volume for any number of pictures.
 
-    The volume is read once. A change of the camera alone keeps the classified voxels; any other change classifies
-    them again. Pictures are drawn without holding Python's lock, so that views in several threads draw at once.
+    The volume is read once, and a change computes again only what depends on it: on the CPU another transfer function,
+    clip plane, kernel or classification classifies the voxels again, and nothing else does; on the GPU everything but
+    the camera. Pictures are drawn without holding Python's lock, so that views in several threads draw at once; threads
+    that share a view take turns.
 
     Parameters
     ----------
@@ -103,11 +107,42 @@ class View:
         return self._native.backend
 
     def set(self, **settings: Any) -> None:
-        """Changes settings, as for `Scene`. If one is not allowed, nothing changes."""
+        """Changes settings. If one is not allowed, nothing changes.
+
+        Parameters
+        ----------
+        **settings
+            Settings over those of the view, as for `Scene`.
+
+        Raises
+        ------
+        SceneError
+            If a key is unknown, a value is not allowed, or the backend does not draw it.
+        """
         self.scene = self._scene.replace(**settings)
 
     def render(self, **settings: Any) -> Image:
-        """Draws a picture, after changing the settings that are given."""
+        """Draws a picture.
+
+        Parameters
+        ----------
+        **settings
+            Settings that are changed before, as by `set`, and stay.
+
+        Returns
+        -------
+        Image
+            The picture, with its `stats`.
+
+        Raises
+        ------
+        SceneError
+            If a setting is not allowed.
+        RenderError
+            If the picture needs more than the GPU allows.
+        DeviceError
+            If the GPU fails.
+        """
         if settings:
             self.set(**settings)
         array, stats, made_on = self._native.draw()
@@ -136,11 +171,27 @@ class View:
         >>> merge([lower, upper])
         <sheetsplat.Image of 32×32 pixels>
         """
+        if slabs is not None:
+            first, end = _several("slabs", slabs, 2, -(2**31), 2**31 - 1)
+            slabs = first, end
+        if region is not None:
+            x, y, width, height = _several("region", region, 4, 0, 2**32 - 1)
+            region = x, y, width, height
         drawn, stats = self._native.draw_part(slabs, region)
         return Part._of(drawn, json.loads(stats))
 
     def split(self, count: int) -> list[dict[str, Any]]:
         """Parts of about equal work, as keyword arguments for `part`.
+
+        Parameters
+        ----------
+        count : int
+            The number of parts.
+
+        Returns
+        -------
+        list of dict
+            `slabs` and `region` of each part.
 
         Examples
         --------
@@ -148,8 +199,7 @@ class View:
         >>> merge(view.part(**piece) for piece in view.split(4))
         <sheetsplat.Image of 32×32 pixels>
         """
-        if count < 1:
-            raise SceneError(f"count: found {count}, allowed: at least 1", "count", str(count), "at least 1")
+        count = whole("count", count, 1, 2**31 - 1)
         pieces = native.split(self._volume._native, self._scene._native, count)
         return [{"slabs": slabs, "region": region} for slabs, region in pieces]
 
@@ -166,8 +216,13 @@ class View:
             Degrees over all pictures, right-handed about ``camera.up``.
         frames : range, optional
             Draw only these of the `count` pictures.
+
+        Yields
+        ------
+        Image
+            The pictures in their order.
         """
-        frames = _frames(count, frames)
+        frames, turn = _frames(count, frames), finite("turn", turn)
         start = self._scene.explicit(self._volume, all_around=True)
         return self._turns(start, frames, turn / count)
 
@@ -191,15 +246,20 @@ def _what_and_how(
     index: str | os.PathLike[str] | None = None,
 ) -> tuple[Volume, Scene]:
     if isinstance(source, Scene) or _is_scene_file(source):
+        _check_single(scene)
         source = look = Scene(source, **settings)
-        if scene is not None:
-            raise TypeError("the source is a scene; give either it or `scene`")
     else:
         look = Scene(scene, **settings)
         if any(key == "volume" or key.startswith("volume.") for key in settings):
-            found, allowed = "a volume beside the source", "no such key: `source`, `spacing` and `labels`"
-            raise SceneError(f"volume: found {found}, allowed: {allowed}", "volume", found, allowed)
+            allowed = "no such key: `source`, `spacing` and `labels`"
+            raise refused(SceneError, "volume", "a volume beside the source", allowed)
     return _opened(source, look, spacing, labels, memory, progress, index), look
+
+
+def _check_single(scene: object) -> None:
+    """Checks that no scene is given beside a source that is one."""
+    if scene is not None:
+        raise refused(SceneError, "scene", "a scene beside a source that is one", "either `scene` or such a source")
 
 
 def _opened(
@@ -215,13 +275,14 @@ def _opened(
     if isinstance(source, Scene):
         volume = source.load_volume(memory=memory, progress=progress, index=index)
     elif isinstance(source, (str, os.PathLike)):
-        volume = Volume._of(_open(source, memory, progress, [None, None, None], look._native, index))
+        steps = None if spacing is None else _spacing(spacing)
+        return Volume._of(_open(source, memory, progress, [None, None, None], look._native, steps, labels, index))
     elif isinstance(source, Volume):
         volume = source
     else:
-        return Volume(source, spacing=spacing, labels=labels)
+        return Volume(source, spacing=spacing, labels=labels, memory=memory)
     if spacing is not None or labels is not None:
-        volume = Volume(volume, spacing=spacing, labels=labels)
+        volume = Volume(volume, spacing=spacing, labels=labels, memory=memory)
     return volume
 
 
@@ -229,14 +290,23 @@ def _is_scene_file(source: Any) -> bool:
     return isinstance(source, (str, os.PathLike)) and os.fsdecode(source).lower().endswith(_SCENE_FILE)
 
 
+def _several(key: str, numbers: Any, count: int, low: int, high: int) -> list[int]:
+    """Some whole numbers within bounds."""
+    try:
+        given = list(numbers)
+    except TypeError:
+        given = []
+    if len(given) != count:
+        raise refused(SceneError, key, repr(numbers), f"{count} whole numbers")
+    return [whole(key, number, low, high) for number in given]
+
+
 def _frames(count: int, frames: range | None) -> range:
-    if count < 1:
-        raise SceneError(f"count: found {count}, allowed: at least 1", "count", str(count), "at least 1")
+    count = whole("count", count, 1, 2**31 - 1)
     if frames is None:
         return range(count)
-    if any(not 0 <= frame < count for end in (frames[:1], frames[-1:]) for frame in end):
-        allowed = f"within range(0, {count})"
-        raise SceneError(f"frames: found {frames}, allowed: {allowed}", "frames", str(frames), allowed)
+    if not isinstance(frames, range) or any(not 0 <= frame < count for end in (frames[:1], frames[-1:]) for frame in end):
+        raise refused(SceneError, "frames", repr(frames), f"a range within range(0, {count})")
     return frames
 
 
@@ -275,7 +345,7 @@ def orbit(
     count: int = 120,
     turn: float = 360.0,
     frames: range | None = None,
-    fps: int = 30,
+    fps: float = 30,
     progress: bool = True,
     **arguments: Any,
 ) -> Iterator[Image] | None:
@@ -290,59 +360,49 @@ def orbit(
         needs Pillow. Without it, an iterator of pictures is returned, and each is drawn when it is asked for.
     count, turn, frames
         As for `View.orbit`.
-    fps : int
+    fps : float
         Pictures per second of a movie.
     progress : bool
         Show bars while the volume is read and files are written, if tqdm is installed.
     **arguments
         As for `View`.
 
+    Yields
+    ------
+    Image
+        The pictures in their order, if no output is given.
+
     Notes
     -----
     Ctrl-C stops between two pictures: numbered pictures that are complete stay, a movie is not written.
     """
-    pattern = None if output is None else _files(os.fspath(output))
-    turns = View(source, progress=progress, **arguments).orbit(count=count, turn=turn, frames=frames)
-    if output is None or pattern is None:
-        return turns
     numbers = _frames(count, frames)
-    pictures = _shown(turns, len(numbers), progress)
-    if pattern[1]:
-        _save_movie(os.fspath(output), list(pictures), fps)
-    else:
-        for frame, image in zip(numbers, pictures, strict=True):
-            image.save(pattern[0] % frame)
+    if output is None:
+        return View(source, progress=progress, **arguments).orbit(count=count, turn=turn, frames=frames)
+    path = os.fspath(output)
+    save = movies.writer(path, len(numbers), fps) if movies.is_movie(path) else _saver(path, numbers)
+    turns = View(source, progress=progress, **arguments).orbit(count=count, turn=turn, frames=frames)
+    save(_shown(turns, len(numbers), progress))
     return None
 
 
-#: The extensions of movies.
-_MOVIES = (".gif", ".apng", ".webp")
-
-
-def _files(output: str) -> tuple[str, bool]:
-    """The pattern of numbered files, or the file of a movie, checked before anything is drawn."""
-    from .errors import ImageError
-
-    if output.lower().endswith(_MOVIES):
-        import PIL.Image  # noqa: F401  Pillow must be there before pictures are drawn.
-
-        return output, True
+def _saver(output: str, numbers: range) -> Callable[[Iterator[Image]], None]:
+    """Saves pictures as numbered files, whose pattern is checked before anything is drawn."""
     folder, name = os.path.split(output)
     numbered = re.fullmatch(r"([^%#]*)(%d|%0\d{1,2}d|#{1,20})([^%#]*)", name)
     if numbered is None:
-        allowed = f"numbered pictures (frame-%04d.png, frame-####.png) or a movie ({', '.join(_MOVIES)})"
-        raise ImageError(f"output: found {output}, allowed: {allowed}", "output", output, allowed)
+        allowed = f"numbered pictures (frame-%04d.png, frame-####.png) or a movie ({', '.join(movies.KINDS)})"
+        raise refused(ImageError, "output", output, allowed)
     before, number, after = numbered.groups()
     number = f"%0{len(number)}d" if number.startswith("#") else number
     pattern = os.path.join(folder.replace("%", "%%"), before + number + after)
     native.check_format(pattern % 0)
-    return pattern, False
 
+    def save(pictures: Iterator[Image]) -> None:
+        for frame, image in zip(numbers, pictures, strict=True):
+            image.save(pattern % frame)
 
-def _save_movie(output: str, pictures: list[Image], fps: int) -> None:
-    first, *others = [picture.to_pil() for picture in pictures]
-    kind = {".gif": "GIF", ".apng": "PNG", ".webp": "WEBP"}[os.path.splitext(output)[1].lower()]
-    first.save(output, kind, save_all=True, append_images=others, duration=1000 / fps, loop=0)
+    return save
 
 
 def _shown(pictures: Iterator[Image], count: int, progress: bool) -> Iterator[Image]:
@@ -398,6 +458,18 @@ def info(
     source: Any, *, spacing: float | Sequence[float] | None = None, memory: int | str | None = None, progress: bool = True
 ) -> dict[str, Any]:
     """Facts about a volume, as `Volume.info`.
+
+    Parameters
+    ----------
+    source
+        The volume, as for `View`.
+    spacing, memory, progress
+        As for `Volume`.
+
+    Returns
+    -------
+    dict
+        The facts, by the names of ``sheetsplat info --json``.
 
     Examples
     --------

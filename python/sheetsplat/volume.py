@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import _native as native
+from ._checks import whole
 from ._loading import loading
 from .errors import VolumeError
 
@@ -29,8 +30,8 @@ class Volume:
     ----------
     source : array, SimpleITK or nibabel image, path or Volume
         An array ``[z, y, x]`` of any integer or floating-point type, with any strides, or anything with ``__array__``
-        (xarray, dask, zarr, torch on the CPU). Its values are copied; NaN and infinite ones are holes, which are not
-        drawn. An image of SimpleITK or nibabel, which also gives spacing and orientation. A path of a volume file or
+        (xarray, dask, zarr, torch on the CPU). Its values are copied as ``float32``; NaN and infinite ones, and those
+        beyond the range of ``float32``, are holes, which are not drawn. An image of SimpleITK or nibabel, which also gives spacing and orientation. A path of a volume file or
         of a folder of slices. Or ``"builtin:NAME"``.
     spacing : float or three floats, optional
         World units between voxels, in the order of an array's axes: z, y, x. Replaces the source's own.
@@ -39,8 +40,9 @@ class Volume:
     channel_axis : int, optional
         The axis of an array of four dimensions along which channels follow one another; the others are z, y, x.
     memory : int or str, optional
-        Bytes that the values may take, such as ``"2GiB"``; three quarters of the machine's without it. A volume of a path
-        that takes more, and can be read by boxes, is streamed: read while it is drawn.
+        Bytes that the values (4 for each voxel of each channel) and labels (2 for each voxel) may take, such as
+        ``"2GiB"``; three quarters of the machine's without it. An array that takes more is refused before it is copied; a
+        volume of a path that takes more, and can be read by boxes, is streamed: read while it is drawn.
     progress : bool
         Show a bar while a path is read for more than a second, if tqdm is installed.
     index : str or path, optional
@@ -75,21 +77,25 @@ class Volume:
         index: str | os.PathLike[str] | None = None,
     ) -> None:
         steps = None if spacing is None else _spacing(spacing)
-        tags = None if labels is None else _array(labels, "labels")
-        if channel_axis is not None:
-            channels = _channels(source, channel_axis)
-            self._native = native.Volume.from_arrays(channels, steps or (1.0, 1.0, 1.0), tags, None, [0.0, 0.0, 0.0])
+        limit = _memory(memory)
+        if channel_axis is None and isinstance(source, (str, os.PathLike)):
+            self._native = _open(source, memory, progress, [channel, time, level], None, steps, labels, index)
             return
-        if isinstance(source, Volume):
+        if channel_axis is None and isinstance(source, Volume):
+            tags = None if labels is None else _array(labels, "labels", 0, limit)
             self._native = source._native
-        elif isinstance(source, (str, os.PathLike)):
-            self._native = _open(source, memory, progress, [channel, time, level], None, index)
-        else:
-            array, own_spacing, axes, origin = _converted(source)
-            self._native = native.Volume.from_arrays([array], steps or own_spacing, tags, axes, origin)
+            if steps is not None or tags is not None:
+                self._native = self._native.replaced(steps, tags, limit)
             return
-        if steps is not None or tags is not None:
-            self._native = self._native.replaced(steps, tags)
+        axes: list[list[float]] | None = None
+        own_spacing, origin = (1.0, 1.0, 1.0), [0.0, 0.0, 0.0]
+        if channel_axis is not None:
+            channels = _channels(source, channel_axis, limit)
+        else:
+            array, own_spacing, axes, origin = _converted(source, limit)
+            channels = [array]
+        tags = None if labels is None else _array(labels, "labels", len(channels), limit)
+        self._native = native.Volume.from_arrays(channels, steps or own_spacing, tags, axes, origin, limit)
 
     @classmethod
     def _of(cls, shared: native.Volume) -> Volume:
@@ -140,13 +146,24 @@ class Volume:
         return self._native.values(0)
 
     def values_of(self, channel: int) -> NDArray[np.float32]:
-        """A copy of the values of a channel, ``[z, y, x]``; holes are NaN."""
-        return self._native.values(channel)
+        """A copy of the values of a channel, ``[z, y, x]``; holes are NaN.
+
+        Parameters
+        ----------
+        channel : int
+            Its number, from 0.
+        """
+        return self._native.values(whole("channel", channel, 0, self.channels - 1, VolumeError))
 
     def info(self) -> dict[str, Any]:
         """Facts about the volume: its grid, the distribution of its values, and the preset that suits it.
 
         Of a volume that is streamed the distribution is that of a sample of the values.
+
+        Returns
+        -------
+        dict
+            The facts, by the names of ``sheetsplat info --json``; sizes and spacings are in the order z, y, x.
         """
         return self._native.info()
 
@@ -161,13 +178,20 @@ def _open(
     progress: bool,
     selection: list[int | None],
     scene: native.Scene | None,
+    spacing: tuple[float, float, float] | None = None,
+    labels: Any = None,
     index: str | os.PathLike[str] | None = None,
 ) -> native.Volume:
-    name = os.fsdecode(path)
+    name, limit = os.fsdecode(path), _memory(memory)
+    selection = [
+        None if number is None else whole(key, number, 0, 2**32 - 1, VolumeError)
+        for key, number in zip(("channel", "time", "level"), selection, strict=True)
+    ]
+    tags = None if labels is None else _array(labels, "labels", 0, limit)
     if name.startswith(_BUILTIN):
-        return native.Volume.builtin(name.removeprefix(_BUILTIN))
+        progress = False
     with loading(name, progress) as bytes_read:
-        return native.Volume.open(name, _memory(memory), selection, scene, bytes_read, index)
+        return native.Volume.open(name, limit, selection, scene, bytes_read, (spacing, tags), index)
 
 
 def _memory(memory: int | str | None) -> str | None:
@@ -188,65 +212,82 @@ def _refused(field: str, found: str, allowed: str) -> VolumeError:
     return VolumeError(f"array: {field}: found {found}, allowed: {allowed}", field, found, allowed)
 
 
-def _array(source: Any, name: str) -> NDArray[Any]:
-    """The array `[z, y, x]` in the machine's byte order; a copy only if its own form cannot be read."""
+def _numpy(source: Any, name: str, allowed: str) -> NDArray[Any]:
+    """The array of NumPy that a source is, holds or computes, whatever errors that raises."""
+    import numpy as np
+
+    try:
+        return np.asarray(source)
+    except Exception as error:
+        # A list of other shapes, a tensor on a GPU or with gradients, a file that was removed, a task that failed.
+        raise _refused(name, f"{type(error).__name__}: {error}", allowed) from error
+
+
+def _array(source: Any, name: str, channels: int, limit: str | None) -> NDArray[Any]:
+    """The array `[z, y, x]`, in whatever form it has.
+
+    It is one of several channels, or labels beside some, which must fit into a number of bytes together.
+    """
     import numpy as np
 
     if name == "array" and not hasattr(source, "__array__") and not isinstance(source, (list, tuple)):
         allowed = "an array, an image of SimpleITK or nibabel, a path, or a Volume"
         raise _refused("source", f"{type(source).__name__}", allowed)
-    try:
-        array = np.asarray(source)
-    except ValueError as error:
-        raise _refused(name, str(error), "three dimensions z, y, x") from error
+    shape = getattr(source, "shape", None)
+    if isinstance(shape, tuple) and len(shape) == 3 and all(isinstance(size, int) and size >= 0 for size in shape):
+        # Before a source that is no array yet, such as one of Zarr or Dask, fills the memory.
+        native.check_sizes(list(shape), channels, name == "labels", limit)
+    array = _numpy(source, name, "three dimensions z, y, x")
     if array.ndim != 3:
         shape = "×".join(map(str, array.shape)) or "a single number"
         field = "shape" if name == "array" else name
         raise _refused(field, f"{array.ndim} dimensions ({shape})", "three dimensions z, y, x")
-    kind, size = array.dtype.kind, array.dtype.itemsize
+    kind = array.dtype.kind
     if kind == "b":
         return array.view(np.uint8)
     if kind not in "iuf":
         raise _refused("dtype", str(array.dtype), "integers or floating-point numbers")
-    if kind == "f" and size not in (4, 8):
-        return array.astype(np.float32 if size == 2 else np.float64)
     if not array.dtype.isnative:
-        array = array.astype(array.dtype.newbyteorder("="))
+        return array
     # `long` and `long long` may be types of equal size that NumPy tells apart.
-    array = array.view(np.dtype(f"{kind}{size}"))
-    return np.require(array, requirements=["A"])
+    return array.view(np.dtype(f"{kind}{array.dtype.itemsize}")) if kind in "iu" else array
 
 
-def _channels(source: Any, axis: int) -> list[NDArray[Any]]:
+def _channels(source: Any, axis: int, limit: str | None) -> list[NDArray[Any]]:
     """The channels of an array of four dimensions."""
     import numpy as np
 
-    array = np.asarray(source) if hasattr(source, "__array__") else None
+    shape = getattr(source, "shape", None)
+    if isinstance(shape, tuple) and len(shape) == 4 and -4 <= axis < 4 and shape[axis] > 0:
+        sizes = list(shape)
+        native.check_sizes(sizes, sizes.pop(axis), False, limit)
+    array = _numpy(source, "array", "four dimensions") if hasattr(source, "__array__") else None
     if array is None or array.ndim != 4 or not -4 <= axis < 4:
         found = type(source).__name__ if array is None else f"{array.ndim} dimensions with channel_axis={axis}"
         raise _refused("shape", found, "an array of four dimensions, of which channel_axis is one")
     if array.shape[axis] == 0:
         raise _refused("shape", "no channel", "at least one")
-    return [_array(channel, "array") for channel in np.moveaxis(array, axis, 0)]
+    count = array.shape[axis]
+    return [_array(channel, "array", count, limit) for channel in np.moveaxis(array, axis, 0)]
 
 
 _Converted = tuple["NDArray[Any]", tuple[float, float, float], "list[list[float]] | None", "list[float]"]
 
 
-def _converted(source: Any) -> _Converted:
+def _converted(source: Any, limit: str | None) -> _Converted:
     if hasattr(source, "GetSpacing") and hasattr(source, "GetDirection"):
-        return _of_itk(source)
+        return _of_itk(source, limit)
     if hasattr(source, "affine") and hasattr(source, "dataobj"):
-        return _of_nibabel(source)
-    return _array(source, "array"), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
+        return _of_nibabel(source, limit)
+    return _array(source, "array", 1, limit), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
 
 
-def _of_itk(image: Any) -> _Converted:
+def _of_itk(image: Any, limit: str | None) -> _Converted:
     """An image of SimpleITK, whose vectors are in the order x, y, z and whose directions are in LPS."""
     import SimpleITK
 
     spacing = image.GetSpacing()
-    array = _array(SimpleITK.GetArrayViewFromImage(image), "array")
+    array = _array(SimpleITK.GetArrayViewFromImage(image), "array", 1, limit)
     if len(spacing) != 3:
         raise _refused("spacing", repr(spacing), "an image of three dimensions")
     rows = image.GetDirection()
@@ -255,20 +296,20 @@ def _of_itk(image: Any) -> _Converted:
     return array, (spacing[2], spacing[1], spacing[0]), axes, origin
 
 
-def _of_nibabel(image: Any) -> _Converted:
+def _of_nibabel(image: Any, limit: str | None) -> _Converted:
     """An image of nibabel, whose axes are x, y, z and whose affine leads to RAS."""
     import numpy as np
 
-    array = np.asanyarray(image.dataobj)
+    array = _numpy(image.dataobj, "array", "an image that can be read")
     if array.ndim == 4 and array.shape[3] == 1:
         array = array[..., 0]
     affine = image.affine
     if affine is None:
-        return _array(array.T, "array"), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
+        return _array(array.T, "array", 1, limit), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
     steps = np.asarray(affine, dtype=float)
     lengths = np.linalg.norm(steps[:3, :3], axis=0)
     if not (np.isfinite(steps).all() and (lengths > 0).all()):
         raise _refused("affine", repr(affine), "finite axes of positive length")
     axes = (steps[:3, :3] / lengths).T.tolist()
     x, y, z = (float(length) for length in lengths)
-    return _array(array.T, "array"), (z, y, x), axes, steps[:3, 3].tolist()
+    return _array(array.T, "array", 1, limit), (z, y, x), axes, steps[:3, 3].tolist()

@@ -154,10 +154,15 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
         return self._painter.whole()
 
     def set(self, **settings: Any) -> None:
-        """Changes settings, as for `Scene`. If one is not allowed, nothing changes.
+        """Changes settings. If one is not allowed, nothing changes.
 
         The camera stays where it is, unless a setting of the camera is among them: then it is where the settings state
         it.
+
+        Parameters
+        ----------
+        **settings
+            Settings over those of the widget, as for `Scene`.
         """
         states_camera = any(key.split(".")[0] == "camera" for key in settings)
         self._state(self._stated.replace(**settings), keeps_camera=not states_camera)

@@ -59,7 +59,7 @@ pub(crate) fn volume(field: &str, found: &str, allowed: &str) -> Raised {
 }
 
 /// The exception of a file that cannot be read or written; its `errno` is the operating system's.
-fn file(path: &std::path::Path, source: &std::io::Error) -> Raised {
+pub(crate) fn file(path: &std::path::Path, source: &std::io::Error) -> Raised {
     let message = match source.raw_os_error() {
         // The operating system's number follows the message; Python shows it itself.
         Some(number) => source.to_string().replace(&format!(" (os error {number})"), ""),

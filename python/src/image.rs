@@ -6,9 +6,9 @@ use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArray
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use sheetsplat::Image;
-use sheetsplat::image::PngDepth;
+use sheetsplat::image::{PngDepth, output};
 
-use crate::error::{Raised, setting};
+use crate::error::{self, Raised, setting};
 
 /// The pixels as an array height × width × 4 that owns them.
 pub(crate) fn array(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
@@ -49,6 +49,12 @@ pub(crate) fn check_format(path: PathBuf) -> PyResult<()> {
 pub(crate) fn save(py: Python<'_>, array: PyReadonlyArray3<'_, f32>, path: PathBuf, depth: u8) -> PyResult<()> {
     let (image, depth) = (image(&array)?, png_depth(depth)?);
     Ok(py.detach(|| image.save(&path, depth).map_err(Raised::from))?)
+}
+
+/// Writes a whole file, as pictures are written: aside, and then renamed.
+#[pyfunction]
+pub(crate) fn write(py: Python<'_>, path: PathBuf, bytes: &[u8]) -> PyResult<()> {
+    Ok(py.detach(|| output::write(&path, bytes)).map_err(|source| error::file(&path, &source))?)
 }
 
 /// The bytes of a PNG.

@@ -20,7 +20,7 @@ mod _native {
     #[pymodule_export]
     use crate::golden::{Comparison, check_golden, compare, open_image};
     #[pymodule_export]
-    use crate::image::{check_format, encode, save};
+    use crate::image::{check_format, encode, save, write};
     #[pymodule_export]
     use crate::part::{Part, merge, split};
     #[pymodule_export]
@@ -28,5 +28,5 @@ mod _native {
     #[pymodule_export]
     use crate::view::View;
     #[pymodule_export]
-    use crate::volume::{BytesRead, Volume};
+    use crate::volume::{BytesRead, Volume, check_sizes};
 }

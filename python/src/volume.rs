@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use sheetsplat::appearance::{Preset, quantiles};
 use sheetsplat::glam::{DMat3, DVec3, UVec3};
 use sheetsplat::scene::{OpenVolume, VolumeSource};
-use sheetsplat::volume::{Labels, Orientation, ReadOptions, builtin};
+use sheetsplat::volume::{Labels, Orientation, ReadOptions};
 
 use crate::array;
 use crate::error::{self, Raised, setting};
@@ -17,6 +17,9 @@ use crate::scene::Scene;
 
 /// The name of volumes from arrays in errors.
 const ORIGIN: &str = "array";
+
+/// What the names of builtin volumes begin with, where paths are allowed too.
+const BUILTIN: &str = "builtin:";
 
 /// The fractions of `info`'s percentiles, and their names.
 const PERCENTILES: [(f64, &str); 9] = [
@@ -36,19 +39,18 @@ const PERCENTILES: [(f64, &str); 9] = [
 pub(crate) struct Volume(pub(crate) OpenVolume);
 
 impl Volume {
-    fn with(py: Python<'_>, make: impl FnOnce() -> Result<sheetsplat::Volume, Raised> + Send) -> PyResult<Self> {
-        Ok(Self(py.detach(make)?.into()))
-    }
-
     /// The volume, which must be in memory for something.
     fn whole(&self, field: &str) -> Result<&Arc<sheetsplat::Volume>, Raised> {
         match &self.0 {
             OpenVolume::Whole(volume) => Ok(volume),
-            OpenVolume::Streamed(_) => {
-                Err(error::volume(field, "a volume that is streamed", "one in memory: a coarser level, or more memory"))
-            }
+            OpenVolume::Streamed(_) => Err(streamed(field)),
         }
     }
+}
+
+/// The error for a volume that must be in memory for something.
+fn streamed(field: &str) -> Raised {
+    error::volume(field, "a volume that is streamed", "one in memory: a coarser level, or more memory")
 }
 
 /// The number of bytes that have been read, which another thread may ask for meanwhile.
@@ -86,11 +88,18 @@ pub(crate) fn reading(
     Ok(options)
 }
 
+/// Checks the sizes of an array `[z, y, x]`, with some channels and maybe labels, before it is made.
+#[pyfunction]
+pub(crate) fn check_sizes(shape: Vec<usize>, channels: usize, labels: bool, memory: Option<&str>) -> PyResult<()> {
+    let limit = reading(memory, None, None)?.memory_limit();
+    Ok(array::Sizes::of(&shape)?.check(channels, labels, limit)?)
+}
+
 #[pymethods]
 impl Volume {
     /// A volume of arrays `[z, y, x]`, one for each channel. `axes` are the directions of x, y and z in the patient (RAS).
     #[staticmethod]
-    #[pyo3(signature = (channels, spacing, labels=None, axes=None, origin=[0.0; 3]))]
+    #[pyo3(signature = (channels, spacing, labels=None, axes=None, origin=[0.0; 3], memory=None))]
     fn from_arrays(
         py: Python<'_>,
         channels: Vec<Bound<'_, PyAny>>,
@@ -98,12 +107,17 @@ impl Volume {
         labels: Option<&Bound<'_, PyAny>>,
         axes: Option<[[f64; 3]; 3]>,
         origin: [f64; 3],
+        memory: Option<&str>,
     ) -> PyResult<Self> {
+        let limit = reading(memory, None, None)?.memory_limit();
+        for channel in &channels {
+            array::sizes(channel)?.check(channels.len(), labels.is_some(), limit)?;
+        }
         let channels = channels.iter().map(array::values).collect::<Result<Vec<_>, _>>()?;
-        let labels = labels.map(array::labels).transpose()?;
+        let labels = labels.map(|labels| read_labels(labels, channels.len(), limit)).transpose()?;
         let orientation =
             axes.map(|axes| Orientation { axes: DMat3::from_cols_array_2d(&axes), origin: origin.into() });
-        Self::with(py, || {
+        let volume = py.detach(|| {
             let channel = |(dims, values): ([u32; 3], Vec<f32>)| {
                 sheetsplat::Volume::new(ORIGIN, dims.into(), zyx(spacing), values)
             };
@@ -111,14 +125,15 @@ impl Volume {
             let further = volumes.split_off(volumes.len().min(1));
             let first = volumes.pop().ok_or_else(|| error::volume("channels", "none", "at least one"))?;
             let volume = first.with_channels(ORIGIN, further)?.with_orientation(ORIGIN, orientation)?;
-            labels.map_or(Ok(volume.clone()), |labels| with_labels(volume, labels))
-        })
+            changed(volume, None, labels)
+        })?;
+        Ok(Self(volume.into()))
     }
 
-    /// A volume file, or a folder of slices: the channel, the time and the level that `selection` states. The scene in which it will be shown chooses a level
-    /// that is left open, or the finest is taken.
+    /// A volume file, a folder of slices, or `builtin:NAME`: the channel, the time and the level that `selection` states. The scene in which it will be shown
+    /// chooses a level that is left open, or the finest is taken. The spacing, in the order z, y, x, and the labels of an array go before the file's.
     #[staticmethod]
-    #[pyo3(signature = (path, memory, selection, scene, bytes_read, index=None))]
+    #[pyo3(signature = (path, memory, selection, scene, bytes_read, changes=None, index=None))]
     fn open(
         py: Python<'_>,
         path: PathBuf,
@@ -126,43 +141,48 @@ impl Volume {
         selection: [Option<u32>; 3],
         scene: Option<&Scene>,
         bytes_read: Option<&BytesRead>,
+        changes: Option<Changes<'_>>,
         index: Option<PathBuf>,
     ) -> PyResult<Self> {
-        let options = reading(memory, index, bytes_read)?;
-        let source = VolumeSource::File(path);
+        let mut options = reading(memory, index, bytes_read)?;
+        let (spacing, labels) = changes.unwrap_or_default();
+        let labels = labels.map(|labels| read_labels(&labels, 1, options.memory_limit())).transpose()?;
+        if let Some((_, labels)) = &labels {
+            options.memory = Some(options.memory_limit().saturating_sub(size_of_val(&**labels) as u64));
+        }
+        let builtin = path.to_str().and_then(|path| path.strip_prefix(BUILTIN)).map(str::to_owned);
+        let source = builtin.clone().map_or(VolumeSource::File(path), VolumeSource::Builtin);
         let mut shown = match scene {
             Some(scene) => sheetsplat::Scene { volume: source, ..scene.scene.clone() },
             None => sheetsplat::Scene::from_volume(source, &[]).map_err(Raised::from)?,
         };
         [shown.index, shown.time, shown.level] = selection;
         (shown.spacing, shown.labels) = (None, None);
-        if scene.is_none() {
+        if scene.is_none() && builtin.is_none() {
             shown.level = shown.level.or(Some(0));
         }
         for channel in &mut shown.further {
             (channel.volume, channel.spacing, channel.labels) = (VolumeSource::Memory, None, None);
         }
-        Ok(Self(py.detach(|| Ok::<_, Raised>(shown.open_volume_and_files(&options)?.0))?))
+        let volume = py.detach(|| {
+            let (volume, _) = shown.open_volume_and_files(&options)?;
+            replaced(volume, spacing, labels)
+        })?;
+        Ok(Self(volume))
     }
 
-    /// A procedural volume.
-    #[staticmethod]
-    fn builtin(py: Python<'_>, name: &str) -> PyResult<Self> {
-        Self::with(py, || Ok(builtin::volume(name)?))
-    }
-
-    /// The same values with another spacing, in the order z, y, x, or with labels of an array.
-    #[pyo3(signature = (spacing=None, labels=None))]
-    fn replaced(&self, py: Python<'_>, spacing: Option<[f64; 3]>, labels: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
-        let labels = labels.map(array::labels).transpose()?;
-        let whole = self.whole("spacing or labels")?;
-        Self::with(py, || {
-            let mut volume = (**whole).clone();
-            if let Some(spacing) = spacing {
-                volume = volume.with_spacing(ORIGIN, zyx(spacing))?;
-            }
-            labels.map_or(Ok(volume.clone()), |labels| with_labels(volume, labels))
-        })
+    /// The same values with another spacing, in the order z, y, x, or with labels of an array. The values are copied, because views may share these.
+    #[pyo3(signature = (spacing=None, labels=None, memory=None))]
+    fn replaced(
+        &self,
+        py: Python<'_>,
+        spacing: Option<[f64; 3]>,
+        labels: Option<&Bound<'_, PyAny>>,
+        memory: Option<&str>,
+    ) -> PyResult<Self> {
+        let limit = reading(memory, None, None)?.memory_limit();
+        let labels = labels.map(|labels| read_labels(labels, self.channels(), limit)).transpose()?;
+        Ok(Self(py.detach(|| replaced(self.0.clone(), spacing, labels))?))
     }
 
     /// The number of voxels along z, y and x.
@@ -257,15 +277,44 @@ fn zyx([z, y, x]: [f64; 3]) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-fn with_labels(volume: sheetsplat::Volume, (dims, values): ([u32; 3], Vec<u16>)) -> Result<sheetsplat::Volume, Raised> {
-    let labels = Labels {
-        origin: "labels".to_owned(),
-        dims: dims.into(),
-        spacing: None,
-        values: values.into(),
-        names: volume.label_names().clone(),
-    };
-    Ok(volume.with_labels(labels)?)
+/// The sizes along x, y and z, and the labels of an array.
+type LabelArray = ([u32; 3], Arc<[u16]>);
+
+/// A spacing in the order z, y, x, and an array of labels, which go before a file's.
+type Changes<'py> = (Option<[f64; 3]>, Option<Bound<'py, PyAny>>);
+
+/// The labels of an array, which may take a number of bytes together with the values of some channels.
+fn read_labels(labels: &Bound<'_, PyAny>, channels: usize, limit: u64) -> Result<LabelArray, Raised> {
+    array::sizes(labels)?.check(channels, true, limit)?;
+    array::labels(labels)
+}
+
+/// An open volume with another spacing, in the order z, y, x, or other labels.
+fn replaced(volume: OpenVolume, spacing: Option<[f64; 3]>, labels: Option<LabelArray>) -> Result<OpenVolume, Raised> {
+    if spacing.is_none() && labels.is_none() {
+        return Ok(volume);
+    }
+    match volume {
+        // Without a copy if nobody shares it.
+        OpenVolume::Whole(volume) => Ok(changed(Arc::unwrap_or_clone(volume), spacing, labels)?.into()),
+        OpenVolume::Streamed(_) => Err(streamed("spacing or labels")),
+    }
+}
+
+fn changed(
+    mut volume: sheetsplat::Volume,
+    spacing: Option<[f64; 3]>,
+    labels: Option<LabelArray>,
+) -> Result<sheetsplat::Volume, Raised> {
+    if let Some(spacing) = spacing {
+        volume = volume.with_spacing(ORIGIN, zyx(spacing))?;
+    }
+    if let Some((dims, values)) = labels {
+        let names = volume.label_names().clone();
+        let labels = Labels { origin: "labels".to_owned(), dims: dims.into(), spacing: None, values, names };
+        volume = volume.with_labels(labels)?;
+    }
+    Ok(volume)
 }
 
 /// The minimum, maximum and mean of the values that are not NaN.

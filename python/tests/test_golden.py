@@ -62,3 +62,91 @@ def test_lax_settings_are_refused(golden, tmp_path: pathlib.Path) -> None:  # ty
     for name, lax in (("a", {"per_channel": 17}), ("a", {"outliers": 0.02}), ("../a", {}), ("all", {})):
         with pytest.raises(sheetsplat.GoldenError):
             golden(picture, name, **lax)
+
+
+PASSING = """
+import numpy as np
+import pytest
+import sheetsplat
+
+RANDOM = np.random.default_rng(5)
+COLOR = RANDOM.integers(0, 256, (6, 9, 3), dtype=np.uint8)
+STRAIGHT = np.dstack([COLOR, RANDOM.integers(0, 256, (6, 9), dtype=np.uint8)])
+UNIT = STRAIGHT.astype(np.float64) / 255
+PREMULTIPLIED = np.dstack([UNIT[..., :3] * UNIT[..., 3:], UNIT[..., 3]])
+SPREAD = np.zeros((12, 27, 3), np.uint8)
+SPREAD[::2, ::3] = COLOR
+
+FORMS = {
+    "color": [
+        COLOR,
+        COLOR.astype(np.int64),
+        COLOR.tolist(),
+        COLOR.astype(np.uint16) * 257,
+        COLOR / 255,
+        (COLOR / 255).astype(np.float32),
+        np.dstack([COLOR, np.full((6, 9), 255, np.uint8)]),
+        SPREAD[::2, ::3],
+        np.ascontiguousarray(COLOR[::-1, ::-1])[::-1, ::-1],
+        np.asfortranarray(COLOR),
+        COLOR.astype(">u2") * 257,
+        sheetsplat.Image(COLOR),
+    ],
+    "alpha": [STRAIGHT, STRAIGHT.astype(np.uint16) * 257, PREMULTIPLIED, PREMULTIPLIED.astype(np.float32), np.asfortranarray(STRAIGHT)],
+}
+
+@pytest.mark.parametrize("name, form", [(name, form) for name, forms in FORMS.items() for form in range(len(forms))])
+def test_form(golden, name, form):
+    golden(FORMS[name][form], name, per_channel=0)
+
+def test_others(golden):
+    changed = COLOR.copy()
+    changed[3, 4, 1] ^= 4
+    with pytest.raises(pytest.fail.Exception, match="1 of 9×6 pixels"):
+        golden(changed, "color", per_channel=3)
+    golden(changed, "color", per_channel=4)
+    with pytest.raises(sheetsplat.ImageError, match="int64 from .* to 256"):
+        golden(np.where(COLOR == COLOR.max(), 256, COLOR.astype(np.int64)), "color")
+    with pytest.raises(pytest.fail.Exception, match="9×6"):
+        golden(COLOR[:5], "color")
+"""
+
+
+def test_every_form_of_a_picture_passes(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Arrays of any type, of three and four channels, and with any strides are the same picture."""
+    pytester.makepyfile(test_it=PASSING)
+    monkeypatch.setenv("SHEETSPLAT_BLESS", "all")
+    pytester.runpytest_subprocess("-p", "no:cacheprovider", "-k", "form and 0").assert_outcomes(passed=3)
+    monkeypatch.delenv("SHEETSPLAT_BLESS")
+    pytester.runpytest_subprocess("-p", "no:cacheprovider").assert_outcomes(passed=18)
+
+
+MANY = """
+import numpy as np
+import pytest
+
+@pytest.mark.parametrize("number", range(6))
+def test_picture(golden, number):
+    golden(np.full((8, 8, 3), number, np.uint8), f"grey{number}", per_channel=0)
+"""
+
+
+def test_failures_of_many_processes_are_on_one_page(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("xdist", reason="pytest-xdist is not installed")
+    pytester.makepyfile(test_it=MANY)
+    monkeypatch.setenv("SHEETSPLAT_BLESS", "grey0,grey3")
+    page = pytester.path / "golden-failures" / "index.html"
+    # The processes that ran these tests stay out of it.
+    for name in ("PYTEST_XDIST_WORKER", "PYTEST_XDIST_WORKER_COUNT"):
+        monkeypatch.delenv(name, raising=False)
+    for _ in range(2):
+        result = pytester.runpytest_subprocess("-p", "no:cacheprovider", "-n", "2")
+        result.assert_outcomes(passed=2, failed=4)
+        result.stdout.fnmatch_lines(["*golden images that failed: *index.html"])
+        text = page.read_text()
+        for number in range(6):
+            assert (f"test_picture[{number}]: grey{number}" in text) == (number not in (0, 3)), number
+            assert (f'src="test_it/grey{number}-actual.png"' in text) == (number not in (0, 3)), number
+    monkeypatch.setenv("SHEETSPLAT_BLESS", "all")
+    pytester.runpytest_subprocess("-p", "no:cacheprovider", "-n", "2").assert_outcomes(passed=6)
+    assert not page.exists()

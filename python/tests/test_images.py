@@ -84,5 +84,5 @@ def test_channels() -> None:
     for source, axis in [(stack, 4), (stack[0], 0), (stack[:, :0], 1)]:
         with pytest.raises(sheetsplat.VolumeError, match="array: shape: found"):
             sheetsplat.Volume(source, channel_axis=axis)
-    with pytest.raises(sheetsplat.VolumeError, match="channel: found 2, allowed: 0 to 1"):
+    with pytest.raises(sheetsplat.VolumeError, match="channel: found 2, allowed: a whole number from 0 to 1"):
         volume.values_of(2)

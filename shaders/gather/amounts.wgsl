@@ -8,14 +8,15 @@
 // Needs gather/voxels.wgsl: ScreenBox, count_drawn, sheets_here.
 // Needs gather/walk.wgsl: SearchBounds.
 // Needs shared/brick.wgsl: BRICK_VOXELS, voxel_of.
-// Needs shared/channels.wgsl: CHANNELS, read_channel.
-// Needs shared/colors.wgsl: own_color.
+// Needs shared/channels.wgsl: CHANNELS.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: sections_on_screen.
+// Needs shared/own_color.wgsl: own_color.
 // Needs shared/project.wgsl: overlapped, project.
-// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of, ramps_of_channel.
+// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
 // Needs shared/shading.wgsl: lighting, shade.
-// Needs shared/volume.wgsl: Gradient, HOLES, gradient_at, index_of, is_hole, stored_at, value_of.
+// Needs shared/texels.wgsl: index_of.
+// Needs shared/volume.wgsl: Gradient, HOLES, gradient_at, is_hole, read_channel, stored_at, value_of.
 
 // The range of the frame's sheets that a kernel overlaps, from the first to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
@@ -87,7 +88,7 @@ fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
     var sum = shaded_first(voxel, p);
     for (var channel = 1u; channel < CHANNELS; channel += 1u) {
         read_channel(channel);
-        let further = shaded_further(voxel, ramps_of_channel(channel), p);
+        let further = shaded_further(voxel, channel, p);
         sum.amount += further.amount;
         sum.alpha += further.alpha;
     }
@@ -95,13 +96,15 @@ fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
 }
 
 // In a channel after the first.
-fn shaded_further(voxel: vec3u, ramps: vec4u, p: vec4f) -> Shaded {
-    let stored = stored_at(index_of(voxel));
+fn shaded_further(voxel: vec3u, channel: u32, p: vec4f) -> Shaded {
+    let index = index_of(voxel);
+    let ramps = ramps_of(channel, index);
+    let stored = stored_at(index);
     let value = value_of(stored);
     let gradient = gradient_at(voxel);
-    let color = ramp(ramps.x, ramps.y, value);
+    let own = own_color(channel, index, ramp(ramps.x, ramps.y, value));
     let alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
-    return of_opacity(color, select(alpha, 0.0, HOLES && is_hole(stored)), gradient, p);
+    return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, p);
 }
 
 fn of_opacity(color: vec3f, alpha: f32, gradient: Gradient, p: vec4f) -> Shaded {
@@ -120,7 +123,7 @@ fn shaded_first(voxel: vec3u, p: vec4f) -> Shaded {
     var alpha = 0.0;
     var is_searched = LABELS;
     if LABELS {
-        ramps = ramps_of(index);
+        ramps = ramps_of(0u, index);
     } else {
         color = ramp_at(color_ramp, value);
         alpha = ramp_at(opacity_ramp, value).x;
@@ -136,6 +139,6 @@ fn shaded_first(voxel: vec3u, p: vec4f) -> Shaded {
         color = ramp(ramps.x, ramps.y, value);
         alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
     }
-    let own = own_color(index, color);
+    let own = own_color(0u, index, color);
     return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, p);
 }

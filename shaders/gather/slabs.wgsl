@@ -13,7 +13,8 @@
 // Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
 // Needs shared/shading.wgsl: lighting, shade.
 // Needs shared/slab_integral.wgsl: slab_integral.
-// Needs shared/volume.wgsl: HOLES, gradient_of, index_of, is_hole, stored_at.
+// Needs shared/texels.wgsl: index_of.
+// Needs shared/volume.wgsl: HOLES, gradient_of, is_hole, stored_at.
 
 // For a thread's four pixels: the sheet depths between which their rays count, the length of a ray per sheet depth, and the depths of first
 // hits, as bits.
@@ -91,7 +92,7 @@ fn ramps_at(point_px: vec2f, sheet_depth: f32) -> vec4u {
     if !LABELS {
         return vec4u(0u, frame.ramps.xyz);
     }
-    return ramps_of(index_of(nearest_voxel(voxel_at(place_of(point_px), sheet_depth))));
+    return ramps_of(0u, index_of(nearest_voxel(voxel_at(place_of(point_px), sheet_depth))));
 }
 
 // Removes a plane's values where the nearest voxel is a hole.

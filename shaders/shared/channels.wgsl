@@ -1,9 +1,4 @@
-// Channels of one grid (SPEC §10), whose values follow one another in `values`. A stage that includes this includes `volume`.
+// Channels of one grid that share sheets (SPEC §10).
 
-// The number of channels.
+// Their number.
 override CHANNELS: u32 = 1u;
-
-// Makes a channel the one that is read.
-fn read_channel(channel: u32) {
-    first_value = channel * frame.dims.x * frame.dims.y * frame.dims.z;
-}

@@ -15,14 +15,15 @@ fn opacity_in(cell: vec4f, x: f32) -> f32 {
     return cell.z + cell.w * clamp((x - cell.x) * cell.y, 0.0, 1.0);
 }
 
-// Whether the point at this share of the way, whose number is in a cell, is at least half opaque.
-fn is_half_opaque(cell: vec4f, x: f32, near: vec4f, far: vec4f, share: f32, ramps: vec4u) -> bool {
-    let opacity = opacity_in(cell, x);
+// Whether the point at this share of the way, whose number is in a cell, is at least half opaque. `alpha` is a factor of its opacity.
+fn is_half_opaque(cell: vec4f, x: f32, near: vec4f, far: vec4f, alpha: f32, share: f32, ramps: vec4u) -> bool {
+    let opacity = opacity_in(cell, x) * alpha;
     return opacity >= 0.5 && opacity * gradient_opacity(ramps, gradient_between(near, far, share)) >= 0.5;
 }
 
-// The share of the way from one sample to the other at which the surface is, if it is between two shares and one set of ramps applies there.
-fn surface_between(near: vec4f, far: vec4f, start: f32, end: f32, ramps: vec4u) -> f32 {
+// The share of the way from one sample to the other at which the surface is, if it is between two shares and one set of ramps applies there. `alpha` is
+// a factor of opacities.
+fn surface_between(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, ramps: vec4u) -> f32 {
     let table = ramps.w;
     let head = control_points[table];
     let domain = control_points[table + 1u];
@@ -48,11 +49,11 @@ fn surface_between(near: vec4f, far: vec4f, start: f32, end: f32, ramps: vec4u) 
             var below = 0.0;
             for (var i = 0u; i <= samples; i += 1u) {
                 var above = f32(i) / f32(samples);
-                if is_half_opaque(cell, mix(enters, leaves, above), near, far, mix(enter, leave, above), ramps) {
+                if is_half_opaque(cell, mix(enters, leaves, above), near, far, alpha, mix(enter, leave, above), ramps) {
                     for (var halving = 0u; halving < F32_HALVINGS; halving += 1u) {
                         let middle = 0.5 * (below + above);
                         let number = mix(enters, leaves, middle);
-                        if is_half_opaque(cell, number, near, far, mix(enter, leave, middle), ramps) {
+                        if is_half_opaque(cell, number, near, far, alpha, mix(enter, leave, middle), ramps) {
                             above = middle;
                         } else {
                             below = middle;
@@ -72,7 +73,7 @@ fn surface_between(near: vec4f, far: vec4f, start: f32, end: f32, ramps: vec4u) 
 
 // The same where each voxel has its own ramps: the way is split at the borders of voxels' cells. `first` and `last` are the samples' points, in
 // voxels.
-fn surface_in_cells(near: vec4f, far: vec4f, start: f32, end: f32, first: vec3f, last: vec3f) -> f32 {
+fn surface_in_cells(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, first: vec3f, last: vec3f) -> f32 {
     let way = last - first;
     var share = start;
     while share < end {
@@ -81,8 +82,8 @@ fn surface_in_cells(near: vec4f, far: vec4f, start: f32, end: f32, first: vec3f,
         let steps = select(vec3f(FAR), (border - place) / way, way != vec3f(0.0));
         // A border that rounding has not quite passed must not hold the ray up.
         let next = min(max(share + min(min(steps.x, steps.y), steps.z), share + 1e-6), end);
-        let ramps = ramps_of(index_of(nearest_voxel(mix(first, last, 0.5 * (share + next)))));
-        let surface = surface_between(near, far, share, next, ramps);
+        let ramps = ramps_of(seen_channel.number, index_of(nearest_voxel(mix(first, last, 0.5 * (share + next)))));
+        let surface = surface_between(near, far, alpha, share, next, ramps);
         if surface != NO_SURFACE {
             return surface;
         }

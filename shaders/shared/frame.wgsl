@@ -32,7 +32,7 @@ struct Frame {
     tiles: u32,
     per_unit: f32,
     headlight: u32,
-    last_label: u32,
+    first_channel: u32,
     value_offset: f32,
     whole_values: u32,
     channel_table: u32,

@@ -10,9 +10,9 @@ struct FieldPlanes {
     value_scale: f32,
     per_number: f32,
     min_moment: f32,
+    channel: u32,
+    colors: u32,
     padding_0: f32,
-    padding_1: f32,
-    padding_2: f32,
 }
 
 // Below this sum of weights there is no value.

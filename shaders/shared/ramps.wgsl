@@ -1,22 +1,28 @@
 // The control points of all ramps, searched in memory, and the ramps of a voxel (SPEC §3). The stage declares `control_points`, and `labels`, a
-// texture array that `gpu::volume_texture` folds.
+// texture array that `gpu::volume_texture` folds, of the labels of all segmented channels, and includes `texels`.
 
 // Whether any label has its own ramps.
 override LABELS: bool = false;
 
-// The start of a voxel's ramps, and the ends of those for colour, opacity and gradient opacity.
-fn ramps_of(index: u32) -> vec4u {
-    if !LABELS {
+// The number of entries of each channel in the table of channels; `gpu::ramps` documents them.
+const CHANNEL_ENTRIES = 3u;
+
+// The start of a voxel's ramps in a channel, and the ends of those for colour, opacity and gradient opacity.
+fn ramps_of(channel: u32, index: u32) -> vec4u {
+    if !LABELS && channel == 0u {
         return vec4u(0u, frame.ramps.xyz);
     }
-    let texel = texel_of(index, textureDimensions(labels).x);
-    let label = textureLoad(labels, texel.xy, texel.z, 0).x;
-    return vec4u(control_points[frame.ramps.w + min(label, frame.last_label)]);
-}
-
-// The same of a voxel in a channel after the first, which has no ramps of labels.
-fn ramps_of_channel(channel: u32) -> vec4u {
-    return vec4u(control_points[frame.channel_table + channel - 1u]);
+    let entry = frame.channel_table + CHANNEL_ENTRIES * channel;
+    if LABELS {
+        // The start of the channel's table of labels, its last entry, and the channel's number among the segmented ones, from 1.
+        let labelled = vec3u(control_points[entry + 1u].xyz);
+        if labelled.z != 0u {
+            let texel = texel_of((labelled.z - 1u) * voxel_count() + index, textureDimensions(labels).x);
+            let label = textureLoad(labels, texel.xy, texel.z, 0).x;
+            return vec4u(control_points[labelled.x + min(label, labelled.y)]);
+        }
+    }
+    return vec4u(control_points[entry]);
 }
 
 // Piecewise linear between the control points first..end, clamped outside.

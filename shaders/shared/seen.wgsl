@@ -1,12 +1,46 @@
-// The look of values and gradients on a pixel's ray (SPEC §9). A stage that includes this declares `LABELS`, and what `cells`, `planes`, `ramps` and
-// `slab_integral` need.
+// The look of a channel's values and gradients on a pixel's ray (SPEC §§9, 10). A stage that includes this declares what `cells`, `channels`, `planes`,
+// `ramps` and `slab_integral` need.
+
+// Whether voxels of any channel have colours of their own.
+override OWN_COLORS: bool = false;
+
+// A channel that is looked at.
+struct SeenChannel {
+    // Its number among those that share sheets.
+    number: u32,
+    // The factor from numbers to values.
+    per_number: f32,
+    // See `FieldPlanes`.
+    min_moment: f32,
+    // Its number among the channels with colours of voxels' own, from 1; 0 if it has none.
+    colors: u32,
+}
+
+var<private> seen_channel: SeenChannel;
+
+// Makes a channel the one that is read and looked at.
+fn see_channel(channel: u32) {
+    read_channel(channel);
+    let scale = control_points[frame.channel_table + CHANNEL_ENTRIES * channel + 2u];
+    seen_channel = SeenChannel(channel, scale.x, scale.y, u32(scale.z));
+}
+
+// Whether voxels have colours of their own.
+fn has_own_colors() -> bool {
+    return OWN_COLORS && seen_channel.colors != 0u;
+}
+
+// The colour and the factor of its opacity: a given colour and 1, or the voxels' own.
+fn colored(given: vec3f, own: vec4f) -> vec4f {
+    return select(vec4f(given, 1.0), own, has_own_colors());
+}
 
 // The ramps of the voxel whose cell holds the point of a pixel's ray at a sheet depth.
 fn ramps_at(at: vec3f, sheet_depth: f32) -> vec4u {
     if !LABELS {
-        return vec4u(0u, frame.ramps.xyz);
+        return ramps_of(seen_channel.number, 0u);
     }
-    return ramps_of(index_of(nearest_voxel(voxel_at(at, sheet_depth))));
+    return ramps_of(seen_channel.number, index_of(nearest_voxel(voxel_at(at, sheet_depth))));
 }
 
 // The amount per unit length (without a logarithm: the opacity) and the colour.
@@ -17,7 +51,7 @@ struct Look {
 
 // The gradient between those of two samples.
 fn gradient_between(near: vec4f, far: vec4f, share: f32) -> Gradient {
-    return gradient_of(0.5 * planes.per_number * mix(near.yzw, far.yzw, share));
+    return gradient_of(0.5 * seen_channel.per_number * mix(near.yzw, far.yzw, share));
 }
 
 // The opacity of a gradient.
@@ -25,12 +59,14 @@ fn gradient_opacity(ramps: vec4u, gradient: Gradient) -> f32 {
     return ramp(ramps.z, ramps.w, gradient.magnitude).x;
 }
 
-// The shaded means over the values between two samples, each a number and its gradient, from the nearer to the farther one.
-fn look(near: vec4f, far: vec4f, ramps: vec4u, light: Lighting) -> Look {
+// The shaded means over the values between two samples, each a number and its gradient, from the nearer to the farther one. `own` is the colour of the
+// voxels' own there.
+fn look(near: vec4f, far: vec4f, own: vec4f, ramps: vec4u, light: Lighting) -> Look {
     let means = slab_integral(ramps.w, near.x, far.x);
     if means.amount <= 0.0 {
         return Look(0.0, vec3f(0.0));
     }
     let gradient = gradient_between(near, far, means.share);
-    return Look(means.amount * gradient_opacity(ramps, gradient), shade(means.color, gradient, light));
+    let color = colored(means.color, own);
+    return Look(means.amount * color.a * gradient_opacity(ramps, gradient), shade(color.rgb, gradient, light));
 }

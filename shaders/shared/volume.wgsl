@@ -1,10 +1,15 @@
-// The volume's values and gradients. The stage declares `values`, a texture array that `gpu::volume_texture` folds.
+// The volume's values and gradients. The stage declares `values`, a texture array that `gpu::volume_texture` folds, and includes `texels`.
 
 // Whether any voxel is a hole (SPEC §3); then values are stored as the bits of an f32.
 override HOLES: bool = false;
 
-// The index of the first value of the channel that is read.
+// The index of the first value of the channel that is read (SPEC §10).
 var<private> first_value: u32 = 0u;
+
+// Makes a channel the one that is read, given by its number among those that share sheets.
+fn read_channel(channel: u32) {
+    first_value = (frame.first_channel + channel) * voxel_count();
+}
 
 fn value_at(index: u32) -> f32 {
     return value_of(stored_at(index));
@@ -22,17 +27,6 @@ fn value_of(stored: u32) -> f32 {
 // Whether the stored bits are NaN, a hole. Compilers may assume that no float is NaN, so the bits are tested.
 fn is_hole(stored: u32) -> bool {
     return (stored & 0x7f800000u) == 0x7f800000u;
-}
-
-// The column, row and layer of a voxel's texel in layers whose side is a power of two.
-fn texel_of(index: u32, side: u32) -> vec3u {
-    let row = index >> firstTrailingBit(side);
-    return vec3u(index & (side - 1u), row & (side - 1u), row >> firstTrailingBit(side));
-}
-
-// The index of a voxel in the volume, x fastest.
-fn index_of(voxel: vec3u) -> u32 {
-    return voxel.x + frame.dims.x * (voxel.y + frame.dims.y * voxel.z);
 }
 
 struct Gradient {

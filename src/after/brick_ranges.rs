@@ -7,9 +7,9 @@
 //! change of the transfer function changes.
 
 use glam::UVec3;
-use rayon::prelude::*;
 
 use crate::lists::iso_range::ValueSet;
+use crate::parallel::prelude::*;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Tables, TransferFunction};
 use crate::volume::range::{EMPTY, union};
@@ -75,6 +75,12 @@ impl BrickRanges {
         let along_y = strided(&along_x, bricks[0], ny, ry);
         let along_z = strided(&along_y, bricks[0] * bricks[1], nz, rz);
         Self { grid: *grid, ranges: along_z }
+    }
+
+    /// Where they lie in memory.
+    #[cfg(test)]
+    pub(crate) fn place(&self) -> *const () {
+        self.ranges.as_ptr().cast()
     }
 
     /// Whether each brick may be drawn.

@@ -5,14 +5,15 @@
 //! axes, each with three diagonals, and is solved along every line by two sweeps, forwards and backwards: a recursive filter (Thomas's algorithm). With other
 //! radii, and with holes, conjugate gradients solve it. The sweeps need 4 bytes per voxel beside the result, conjugate gradients 16.
 
-use std::sync::Arc;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{IVec3, UVec3};
-use rayon::prelude::*;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
-use crate::volume::{Grid, Volume};
+use crate::parallel::prelude::*;
+use crate::volume::{Grid, Texel, Volume};
 
 /// The maximum error of the field at the voxels, relative to the values' range; SPEC §9 asks for 1e-5.
 const TOLERANCE: f64 = 2e-6;
@@ -23,19 +24,111 @@ const MAX_STEPS: u32 = 2000;
 /// The radii at which a kernel holds the 27 voxels around its own and no others.
 const CUBE: std::ops::RangeInclusive<f64> = 1.732_050_807_568_878..=2.0;
 
-/// The coefficients of a volume's values, which the volume keeps. The program's log shows the progress.
+/// The target of the log's records that tell the progress: "WHAT: N %", in the end 100 %. The program shows them as a line on the terminal.
+pub const PROGRESS: &str = "sheetsplat::progress";
+
+/// The last solutions, so that a volume that is read again is not solved again. A volume keeps its own as long as it lives.
+static SOLVED: Mutex<Solutions> = Mutex::new(Solutions { last: VecDeque::new(), max_bytes: 128 << 20 });
+
+/// Solutions, the last one first, which together take at most so many bytes.
+#[derive(Debug)]
+struct Solutions {
+    last: VecDeque<(Fingerprint, Arc<[f32]>)>,
+    max_bytes: usize,
+}
+
+/// A hash of values, their grid's dimensions, and the kernel: all that the solution depends on.
+type Fingerprint = blake3::Hash;
+
+impl Solutions {
+    fn get(&mut self, fingerprint: Fingerprint) -> Option<Arc<[f32]>> {
+        let place = self.last.iter().position(|(of, _)| *of == fingerprint)?;
+        let found = self.last.remove(place)?;
+        let coefficients = Arc::clone(&found.1);
+        self.last.push_front(found);
+        Some(coefficients)
+    }
+
+    fn insert(&mut self, fingerprint: Fingerprint, coefficients: &Arc<[f32]>) {
+        let bytes_of = |coefficients: &Arc<[f32]>| size_of_val::<[f32]>(coefficients);
+        if bytes_of(coefficients) > self.max_bytes {
+            return;
+        }
+        // Of threads that solved the same, the last one's is kept.
+        self.last.retain(|(of, _)| *of != fingerprint);
+        self.last.push_front((fingerprint, Arc::clone(coefficients)));
+        let mut bytes = 0;
+        let max_bytes = self.max_bytes;
+        self.last.retain(|(_, coefficients)| {
+            bytes += bytes_of(coefficients);
+            bytes <= max_bytes
+        });
+    }
+}
+
+fn fingerprint(grid: &Grid, values: &[f32], (radius, falloff): (f64, f64)) -> Fingerprint {
+    let mut hasher = blake3::Hasher::new();
+    grid.dims.to_array().iter().for_each(|n| _ = hasher.update(&n.to_le_bytes()));
+    [radius, falloff].iter().for_each(|x| _ = hasher.update(&x.to_le_bytes()));
+    hasher.update(bytemuck::cast_slice(values));
+    hasher.finalize()
+}
+
+/// The coefficients of a volume's values, which the volume keeps, and the process for a while. The log's target [`PROGRESS`] gets the progress.
 ///
 /// # Errors
 /// As for [`exact`].
 pub fn of_volume(volume: &Volume, kernel: (f64, f64)) -> Result<Arc<[f32]>, RenderError> {
     volume.coefficients(kernel, || {
-        exact(volume.grid(), volume.values(), kernel, &|share| {
-            log::info!("coefficients of splatting.interpolation = \"exact\": {:.0} %", 100.0 * share);
+        solved(volume.grid(), volume.values(), kernel, &|share| {
+            log::info!(target: PROGRESS, "coefficients of splatting.interpolation = \"exact\": {:.0} %", 100.0 * share);
         })
     })
 }
 
-/// The coefficients of values on a grid; NaN at holes, where values are NaN. Calls `progress` with the fraction that is done.
+/// The coefficients of the colours of a volume's voxels, red, green, blue and A (SPEC §10); NaN at holes. `None` if voxels have none of their own.
+///
+/// # Errors
+/// As for [`exact`].
+pub fn of_colors(volume: &Volume, kernel: (f64, f64)) -> Result<Option<Arc<[[f32; 4]]>>, RenderError> {
+    let Some(texels) = volume.colors() else { return Ok(None) };
+    let mut colors = vec![[0.0; 4]; texels.len()];
+    for component in 0..4 {
+        let own = |(texel, value): (&Texel, &f32)| {
+            if value.is_nan() { f32::NAN } else { f32::from(texel[component]) / f32::from(u16::MAX) }
+        };
+        let numbers: Vec<f32> = texels.par_iter().zip(volume.values()).map(own).collect();
+        let exact = solved(volume.grid(), &numbers, kernel, &|share| {
+            let percent = 25.0 * (component as f64 + share);
+            log::info!(target: PROGRESS, "coefficients of the voxels' colours: {percent:.0} %");
+        })?;
+        colors.par_iter_mut().zip(exact.par_iter()).for_each(|(color, &number)| color[component] = number);
+    }
+    Ok(Some(colors.into()))
+}
+
+/// The same as [`exact`] gives, from the process's last solutions if they have it.
+///
+/// # Errors
+/// As for [`exact`].
+pub fn solved(
+    grid: &Grid,
+    values: &[f32],
+    kernel: (f64, f64),
+    progress: &dyn Fn(f64),
+) -> Result<Arc<[f32]>, RenderError> {
+    let fingerprint = fingerprint(grid, values, kernel);
+    let solutions = || SOLVED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = solutions().get(fingerprint) {
+        progress(1.0);
+        return Ok(known);
+    }
+    let coefficients = exact(grid, values, kernel, progress)?.into();
+    solutions().insert(fingerprint, &coefficients);
+    Ok(coefficients)
+}
+
+/// The coefficients of values on a grid; NaN at holes, where values are NaN. Calls `progress` with the fraction that is done, in the end 1.
 ///
 /// # Errors
 /// If the iteration does not converge, because rounding is too coarse for values whose range is tiny compared with their size.
@@ -49,6 +142,7 @@ pub fn exact(
     let [min, max] = ends.map(f64::from);
     if radius <= 1.0 || min >= max || min > max {
         // Each voxel is alone in its kernel, or all values are equal, or there are only holes.
+        progress(1.0);
         return Ok(values.to_vec());
     }
     // The coefficients of a constant are that constant, so values can be shifted to around 0, where rounding is finest.
@@ -64,6 +158,7 @@ pub fn exact(
             SettingError::new(key, found, "\"smooth\", or a larger splatting.falloff")
         })?
     };
+    progress(1.0);
     Ok(moved.into_par_iter().zip(values).map(|(c, value)| if value.is_nan() { f32::NAN } else { c + middle }).collect())
 }
 
@@ -92,7 +187,6 @@ fn along_axes(dims: UVec3, values: &[f32], middle: f32, falloff: f64, progress: 
         let (y, z) = (at % ny, at / ny);
         row.copy_from_slice(&rows[y][z * nx..][..nx]);
     });
-    progress(1.0);
     c
 }
 
@@ -252,5 +346,85 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// SPEC §9: the field is the value at every voxel but holes, to 1e-5 of the values' range; at borders, at corners and beside holes too.
+    #[test]
+    fn the_field_is_the_value_at_every_voxel() {
+        let grid = Grid::new(UVec3::new(11, 9, 8), DVec3::ONE);
+        let kernels = [
+            (2.0, 2.0),
+            (2.0, 1.0),
+            (2.0, 0.95),
+            (1.8, 1.5),
+            (1.0, 0.3),
+            (1.5, 3.0),
+            (3.2, 1.1),
+            (4.0, 1.0),
+            (4.0, 11.0),
+        ];
+        for (kernel, holes) in kernels.into_iter().flat_map(|kernel| [false, true].map(|holes| (kernel, holes))) {
+            let value = |index: u32| match index.wrapping_mul(2_654_435_761) >> 24 {
+                0..12 if holes => f32::NAN,
+                noise => noise as f32 * 16.0 - 1000.0,
+            };
+            let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
+            let coefficients = exact(&grid, &values, kernel, &|_| {}).unwrap();
+            let (radius, falloff) = kernel;
+            let mut worst = 0.0_f64;
+            for (index, &value) in (0..).zip(&values).filter(|(_, value)| !value.is_nan()) {
+                let at = grid.voxel_at(index).as_dvec3();
+                let (mut sum, mut weights) = (0.0, 0.0);
+                for (other, &c) in (0..).zip(&coefficients).filter(|(_, c)| !c.is_nan()) {
+                    let squared = grid.voxel_at(other).as_dvec3().distance_squared(at);
+                    if squared < radius * radius {
+                        let weight = (-falloff * squared).exp();
+                        sum += weight * f64::from(c);
+                        weights += weight;
+                    }
+                }
+                worst = worst.max((sum / weights - f64::from(value)).abs());
+            }
+            let (min, max) = values.iter().fold((f32::MAX, f32::MIN), |(a, b), &v| (a.min(v), b.max(v)));
+            let range = f64::from(max) - f64::from(min);
+            assert!(worst <= 1e-5 * range, "{kernel:?}, holes {holes}: {worst} of {range}");
+        }
+    }
+
+    #[test]
+    fn volumes_that_are_read_again_are_not_solved_again() {
+        let grid = Grid::new(UVec3::new(5, 6, 7), DVec3::ONE);
+        let values: Vec<f32> = (0..210).map(|index| ((index * 31) % 17) as f32).collect();
+        let solve = |values: &[f32], kernel| {
+            let steps = std::cell::Cell::new(0);
+            let solution = solved(&grid, values, kernel, &|share| {
+                steps.set(steps.get() + 1);
+                assert!(share <= 1.0);
+            });
+            (solution.unwrap(), steps.get())
+        };
+        let (first, steps) = solve(&values, (2.0, 1.25));
+        assert!(steps > 1, "{steps}");
+        let (again, steps) = solve(&values.clone(), (2.0, 1.25));
+        assert!(Arc::ptr_eq(&first, &again) && steps == 1, "{steps}");
+        assert!(!Arc::ptr_eq(&first, &solve(&values, (2.0, 1.5)).0), "another kernel");
+        let mut changed = values.clone();
+        changed[100] += 1.0;
+        assert!(!Arc::ptr_eq(&first, &solve(&changed, (2.0, 1.25)).0), "another value");
+    }
+
+    #[test]
+    fn the_last_solutions_stay_as_long_as_they_fit() {
+        let mut solutions = Solutions { last: VecDeque::new(), max_bytes: 100 };
+        let keys = [1_u8, 2, 3, 4].map(|key| blake3::hash(&[key]));
+        let ten: Arc<[f32]> = vec![0.0; 10].into();
+        keys[..3].iter().for_each(|&key| solutions.insert(key, &ten));
+        assert!(solutions.get(keys[0]).is_none() && solutions.get(keys[1]).is_some());
+        // The one that was asked for last stays.
+        solutions.insert(keys[0], &ten);
+        assert!(solutions.get(keys[1]).is_some() && solutions.get(keys[2]).is_none());
+        let large: Arc<[f32]> = vec![0.0; 26].into();
+        solutions.insert(keys[3], &large);
+        assert!(solutions.get(keys[3]).is_none() && solutions.get(keys[1]).is_some());
     }
 }

@@ -39,6 +39,14 @@ impl Normalization {
     pub fn apply(&self, value: f64) -> f64 {
         (value - self.base) * self.scale
     }
+
+    /// The rounding error of `Σ c·g·δ / N - f·Σ g·δ / N` with a kernel of this radius, whose terms are added one by one: where all values are equal it is no
+    /// longer, and a direction made of it would be noise.
+    pub fn min_moment(&self, radius: f64) -> f32 {
+        // About as many units in the last place as a kernel of the default radius reaches voxels.
+        const UNITS: f32 = 32.0;
+        UNITS * f32::EPSILON * radius as f32 * self.range[0].abs().max(self.range[1].abs())
+    }
 }
 
 #[cfg(test)]

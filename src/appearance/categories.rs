@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::quantile::histogram;
+use crate::parallel::prelude::*;
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::Volume;
 
@@ -46,7 +46,7 @@ pub fn is_label_map(volume: &Volume) -> bool {
         return false;
     }
     let Some(counts) = counts(volume) else { return false };
-    if volume.labels().is_none() && !volume.label_names().is_empty() {
+    if volume.is_known_label_map() {
         return true;
     }
     if counts.len() < 3 {

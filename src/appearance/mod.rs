@@ -32,12 +32,22 @@ impl TransferFunction {
     }
 }
 
-/// The transfer function of one of several channels that comes without one, in its file's colour or one given: as with [`Preset::Confocal`], or labels.
+/// The transfer function of one of several channels that comes without one, in its file's colour or one given: as with [`Preset::Confocal`], or for a
+/// volume of colours as for one alone.
 pub(crate) fn one_of_several(volume: &Volume) -> TransferFunction {
-    if categories::is_label_map(volume) || volume.colors().is_some() {
-        return TransferFunction::from_histogram(volume);
+    match volume.colors() {
+        Some(_) => TransferFunction::from_histogram(volume),
+        None => preset::confocal_of_several(volume),
     }
-    preset::confocal(volume)
+}
+
+/// The transfer function of a label map among several channels: its labels' colours, under [`Preset::Fusion`] translucent.
+pub(crate) fn labels_of_several(volume: &Volume, preset: Option<Preset>) -> TransferFunction {
+    let labels = categories::transfer(&categories::values(volume).unwrap_or_default());
+    match preset {
+        Some(Preset::Fusion) => TransferFunction { opacity: preset::translucent_labels(), ..labels },
+        _ => labels,
+    }
 }
 
 /// [`TransferFunction::from_histogram`] for values that are not labels.

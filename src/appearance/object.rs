@@ -1,9 +1,8 @@
 //! Separates an object in a volume from its background.
 
-use rayon::prelude::*;
-
 use super::padding::{AIR, is_padded};
 use super::quantile::quantiles;
+use crate::parallel::prelude::*;
 use crate::settings::transfer_function::Ramp;
 
 const BINS: usize = 256;

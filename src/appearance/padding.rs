@@ -1,6 +1,6 @@
 //! The padding that CT scanners write outside the scanned cylinder.
 
-use rayon::prelude::*;
+use crate::parallel::prelude::*;
 
 /// Air in Hounsfield units.
 pub(super) const AIR: f64 = -1000.0;

@@ -7,6 +7,7 @@ use super::hounsfield::Hounsfield;
 use super::object::Object;
 use super::quantile::quantiles;
 use super::{categories, channel_display, constant, xray};
+use crate::parallel::prelude::*;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, TransferFunction};
@@ -32,7 +33,7 @@ pub enum Preset {
     Confocal,
     /// Labels: one colour each; see [`categories`].
     Labels,
-    /// Several channels (SPEC §10): the first gray and solid, such as CT, the others hot and translucent, such as PET.
+    /// Several channels (SPEC §10): the first gray, such as CT, with a surface that lets the others through, which are hot and translucent, such as PET.
     Fusion,
     /// A volume of colours (SPEC §10), such as photographed slices: opaque, in these colours. Other volumes are gray.
     Photo,
@@ -87,6 +88,11 @@ impl Preset {
         !matches!(self, Self::Xray | Self::Mip | Self::Confocal | Self::Labels | Self::Fusion)
     }
 
+    /// Whether a label map among several channels keeps its labels' colours: not in projections, which add up or compare amounts.
+    pub(crate) fn keeps_labels(self) -> bool {
+        !matches!(self, Self::Xray | Self::Mip)
+    }
+
     /// The transfer function for a volume. Those for CT are in Hounsfield units: the values themselves if one in a thousand is below -100;
     /// or else the values less 1024 if the maximum lies within 1500 to 8191; or else a scale on which the background (by Otsu's threshold)
     /// is air, -1000, and the faintest eighth of the rest is water, 0. Without labels in the volume, [`Self::Labels`] gives
@@ -119,7 +125,8 @@ impl Preset {
             Self::Mip => Object::find(values).map_or_else(|| constant(0.5), |object| mip(values, &object)),
             Self::Confocal => confocal(volume),
             Self::Labels => labels(volume).unwrap_or_else(|| TransferFunction::from_histogram(volume)),
-            Self::Fusion | Self::Photo => Object::find(values).map_or_else(|| constant(0.5), |object| solid(&object)),
+            Self::Fusion => Object::find(values).map_or_else(|| constant(0.1), |object| glass(volume, &object)),
+            Self::Photo => Object::find(values).map_or_else(|| constant(0.5), |object| solid(&object)),
         }
     }
 
@@ -164,11 +171,35 @@ fn solid(object: &Object) -> TransferFunction {
     TransferFunction::by_value(Ramp::through(color), object.surface(0.9))
 }
 
+/// Gray like glass, so that what glows within is seen: a surface, little in most of the object, and what is brighter, such as bone, denser again.
+fn glass(volume: &Volume, object: &Object) -> TransferFunction {
+    /// Opacities times the volume's mean extent, so that volumes of any resolution let as much through.
+    const DEPTHS: [f64; 3] = [16.0, 0.5, 8.0];
+    const MOST: f64 = 0.25;
+    let [surface, inside, bright] = DEPTHS.map(|depth| (depth / extent(volume)).min(MOST));
+    let threshold = object.threshold();
+    let mut opacity = vec![
+        (threshold - (threshold - object.background) / 3.0, 0.0),
+        (threshold, surface),
+        (object.faint, inside),
+        (object.bright, inside),
+        (object.bright + (object.bright - threshold) / 2.0, bright),
+    ];
+    // In homogeneous matter the two are one.
+    opacity.dedup_by_key(|point| point.0);
+    TransferFunction { opacity: Ramp::through(opacity), ..solid(object) }
+}
+
 /// A glow that is hotter, and denser, where values are greater.
 fn hot(volume: &Volume, object: &Object) -> TransferFunction {
     let opacity = Ramp::through(vec![(object.threshold(), 0.0), (object.bright, 0.25)]);
     let glow = TransferFunction::by_value(Ramp::through(vec![(object.background, DVec3::ONE)]), opacity);
     TransferFunction { color: Colormap::Hot.of(volume, &glow).unwrap_or(glow.color.clone()), ..glow }
+}
+
+/// The opacity of labels over a first channel that is to be seen too: every label but 0.
+pub(super) fn translucent_labels() -> Ramp<f64> {
+    Ramp::through(vec![(0.0, 0.0), (1.0, 0.3)])
 }
 
 /// White, with an opacity that rises from the background to a value that few voxels exceed.
@@ -183,7 +214,32 @@ fn mip(values: &[f32], object: &Object) -> TransferFunction {
 
 /// A haze over the window that the volume's file states, or else from the background to the brightest eighth of the object; in the file's colours,
 /// or else green.
-pub(super) fn confocal(volume: &Volume) -> TransferFunction {
+fn confocal(volume: &Volume) -> TransferFunction {
+    haze(volume, |_| 0.5)
+}
+
+/// The same for one of several channels, so thin that one lets others behind it through: the mean ray through the volume meets an
+/// optical depth of `DEPTH`.
+pub(super) fn confocal_of_several(volume: &Volume) -> TransferFunction {
+    const DEPTH: f64 = 0.4;
+    const MOST: f64 = 0.5;
+    // Whole numbers, whose sum does not depend on their order.
+    const STEPS: f64 = 65536.0;
+    haze(volume, |[start, top]| {
+        let share = |value: f32| ((f64::from(value) - start) / (top - start)).clamp(0.0, 1.0);
+        let sum: u64 = volume.values().par_iter().map(|&value| (share(value) * STEPS) as u64).sum();
+        let mean = sum as f64 / STEPS / volume.values().len() as f64;
+        (DEPTH / (mean * extent(volume))).min(MOST)
+    })
+}
+
+/// The mean of a volume's sides, in its smallest spacing.
+fn extent(volume: &Volume) -> f64 {
+    (volume.dims().as_dvec3() * volume.grid().aspect()).element_sum() / 3.0
+}
+
+/// [`confocal`] with the opacity at a window's end.
+fn haze(volume: &Volume, opacity: impl Fn([f64; 2]) -> f64) -> TransferFunction {
     let (object, display) = (Object::find(volume.values()), volume.display());
     let around = |object: &Object| [(object.background + object.threshold()) / 2.0, object.bright];
     let window = display.and_then(|display| display.window).or(object.as_ref().map(around));
@@ -191,7 +247,7 @@ pub(super) fn confocal(volume: &Volume) -> TransferFunction {
     let dark = object.map_or(start, |object| object.background).min(start);
     let green = || Ramp::through(vec![(dark, DVec3::new(0.0, 0.35, 0.05)), (top, DVec3::new(0.55, 1.0, 0.6))]);
     let color = display.and_then(channel_display::color).unwrap_or_else(green);
-    TransferFunction::by_value(color, Ramp::through(vec![(start, 0.0), (top, 0.5)]))
+    TransferFunction::by_value(color, Ramp::through(vec![(start, 0.0), (top, opacity([start, top]))]))
 }
 
 fn labels(volume: &Volume) -> Option<TransferFunction> {

@@ -1,8 +1,7 @@
 //! Histograms, and exact quantiles without sorting.
 
-use rayon::prelude::*;
-
 use crate::lists::iso_range::{of_ordinal, ordinal};
+use crate::parallel::prelude::*;
 
 /// The number of values that one thread counts at a time.
 const CHUNK: usize = 1 << 20;

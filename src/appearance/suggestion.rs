@@ -1,12 +1,11 @@
 //! The preset that fits a volume, judged by its values and its file.
 
-use rayon::prelude::*;
-
 use super::categories;
 use super::hounsfield::offset_of;
 use super::object::Object;
 use super::preset::Preset;
 use super::quantile::quantiles;
+use crate::parallel::prelude::*;
 use crate::volume::Volume;
 
 /// Hounsfield units of air, of soft tissue, and of everything denser than lungs.

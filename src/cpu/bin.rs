@@ -3,12 +3,12 @@
 use std::ops::Range;
 
 use glam::{DVec2, DVec3};
-use rayon::prelude::*;
 
 use super::project::Projection;
 use super::sheets::{COLUMNS, ROWS};
 use crate::lists::brick;
 use crate::lists::brick::Brick;
+use crate::parallel::prelude::*;
 
 /// Slack around footprints' boxes for rounding in f32: pixels, and a fraction of the box.
 const SLACK: f64 = 0.02;

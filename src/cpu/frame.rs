@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use fearless_simd::{Level, Simd, dispatch};
 use glam::UVec3;
-use rayon::prelude::*;
 
 use super::bin::{self, Placed};
 use super::composite::Compositor;
@@ -26,6 +25,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::kernel::Kernel;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::{Overlaps, PlaceDepths, tile_grid};
+use crate::parallel::prelude::*;
 use crate::part::{Content, Extreme, Resolver};
 use crate::scene::Scene;
 use crate::settings::splatting::{Classification, Compositing, Method, Order};

@@ -56,7 +56,7 @@ impl Layer {
             }
             List::After(coefficients) if splatting.classification == Classification::After && is_same_kernel => {
                 if !(is_same_function && splatting.compositing == old.compositing) {
-                    coefficients.iter_mut().for_each(Coefficients::forget);
+                    coefficients.iter_mut().for_each(Coefficients::retest);
                 }
             }
             _ => self.list = List::new(&self.volume, transfer, new)?,
@@ -172,6 +172,7 @@ mod tests {
     use crate::cpu::CpuRenderer;
     use crate::scene::VolumeSource;
     use crate::settings::splatting::Interpolation;
+    use crate::settings::transfer_function::Ramp;
 
     /// Where what voxels are drawn from lies in memory.
     fn list_of(renderer: &CpuRenderer) -> *const () {
@@ -204,5 +205,28 @@ mod tests {
             renderer.set_scene(&scene).unwrap();
             assert_ne!(list_of(&renderer), list, "{classification:?}");
         }
+    }
+
+    /// Another transfer function tests the kept ranges of bricks anew, and makes another list of bricks only if it shows others.
+    #[test]
+    fn a_changed_transfer_function_tests_the_kept_ranges() {
+        let sets = ["image={width=16,height=16}", "camera.fit=volume"].map(str::to_owned);
+        let mut scene = Scene::from_volume(VolumeSource::Builtin("head:24".to_owned()), &sets).unwrap();
+        scene.splatting.classification = Classification::After;
+        let mut renderer = CpuRenderer::new(scene.load_volume().unwrap(), &scene).unwrap();
+        let mut places = |points: &[(f64, f64)]| {
+            scene.transfer.opacity = Some(Ramp::new(points.to_vec()).unwrap());
+            renderer.set_scene(&scene).unwrap();
+            renderer.draw().unwrap();
+            let List::After(coefficients) = &renderer.layers[0].list else { unreachable!() };
+            coefficients[0].places()
+        };
+        let [first_bricks, first_ranges] = places(&[(60.0, 0.0), (100.0, 0.5)]);
+        assert!(first_bricks.is_some() && first_ranges.is_some());
+        // The same values have an opacity.
+        assert_eq!(places(&[(60.0, 0.0), (80.0, 0.1), (120.0, 0.9)]), [first_bricks, first_ranges]);
+        let [bricks, ranges] = places(&[(150.0, 0.0), (180.0, 0.9)]);
+        assert_ne!(bricks, first_bricks);
+        assert_eq!(ranges, first_ranges);
     }
 }

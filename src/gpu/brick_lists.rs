@@ -44,6 +44,11 @@ impl BrickLists {
         Self::of(device, BrickList::new(grid, voxels))
     }
 
+    /// Lists the bricks of voxels, given as indices into the volume, which the next [`Self::flush`] uploads.
+    pub fn new(grid: &Grid, voxels: &[u32]) -> Self {
+        Self { lists: Vec::new(), bricks: BrickList::new(grid, voxels), state: State::Full }
+    }
+
     fn of(device: &Device, bricks: BrickList) -> Self {
         let (ranges, capacity) = split(&device.limits(), bricks.bricks().len());
         let lists = ranges.map(|range| BrickBuffer::upload(device, range, capacity, &bricks)).collect();

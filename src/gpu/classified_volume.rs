@@ -1,25 +1,28 @@
 //! A volume under a transfer function on the GPU: its values, the voxels that take part (§5.1), and their changes.
 
+use std::borrow::Cow;
+use std::ops::Range;
 use std::sync::Arc;
 
-use glam::UVec3;
-use rayon::prelude::*;
 use wgpu::{Device, Limits, Queue, TextureView};
 
-use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::brick_lists::{BrickLists, SettledBricks};
 use crate::gpu::counts::{GroupSlabs, Totals};
-use crate::gpu::gpu_volume::{Coefficients, GpuVolume};
+use crate::gpu::gpu_volume::GpuVolume;
+use crate::gpu::ramps::Stored;
+use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks, ShownInChannel};
 use crate::gpu::volume_texture::OwnColors;
+use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
-use crate::lists::classify::{classify, in_rows, takes_part};
+use crate::lists::classify::{channels, classify, in_rows, takes_part};
 use crate::lists::iso_range::ValueSet;
 use crate::lists::quad_plan::{Overlaps, tile_grid};
 use crate::lists::value_list::ValueList;
+use crate::parallel::prelude::*;
 use crate::settings::clip::ClippedVoxels;
-use crate::settings::splatting::Classification;
+use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::stats::Counts;
 use crate::volume::{Grid, Volume};
@@ -30,43 +33,25 @@ pub struct ClassifiedVolume {
     volume: GpuVolume,
     transfer: TransferFunction,
     clipped: ClippedVoxels,
-    pub(crate) lists: BrickLists,
+    /// The voxels that are drawn: one list for all channels if one splat draws a voxel in all of them, otherwise one for each channel that is drawn
+    /// (SPEC §10).
+    pub(crate) lists: Vec<BrickLists>,
     /// A counter of changes to the lists.
     pub(crate) revision: u64,
     classification: Classification,
+    /// How the images of channels become one, if they have images of their own.
+    joining: Option<Joining>,
     /// With [`Classification::After`] which bricks the lists hold, once a frame asked for them.
     shown: Option<ShownBricks>,
 }
 
-/// The bricks that may be drawn where values are classified after splatting (SPEC §9).
-#[derive(Debug)]
-struct ShownBricks {
-    /// What they were found for.
-    needs: BrickNeeds,
-    ranges: BrickRanges,
-    /// Whether each brick of the grid is drawn.
-    are_shown: Vec<bool>,
-}
-
-/// What decides, beside the transfer function, which bricks may be drawn.
-#[derive(Clone, Debug)]
-pub(crate) struct BrickNeeds {
-    /// How far from a brick voxels bear on what it shows.
-    pub(crate) reach: UVec3,
-    /// Where they are not the values.
-    pub(crate) coefficients: Option<Arc<Coefficients>>,
-    /// Which values bear on the image.
-    pub(crate) bearing: Bearing,
-}
-
-impl PartialEq for BrickNeeds {
-    fn eq(&self, other: &Self) -> bool {
-        let same = match (&self.coefficients, &other.coefficients) {
-            (Some(own), Some(others)) => Arc::ptr_eq(own, others),
-            (own, others) => own.is_none() && others.is_none(),
-        };
-        (self.reach, self.bearing) == (other.reach, other.bearing) && same
-    }
+/// Channels that share sheets, and their lists.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Layer {
+    /// The channels, by their numbers in the volume.
+    pub(crate) channels: Range<usize>,
+    /// Their lists, by their indices in [`ClassifiedVolume::lists`].
+    pub(crate) lists: Range<usize>,
 }
 
 /// The effect of a change of transfer function or iso-ranges.
@@ -81,34 +66,94 @@ pub struct Touched {
 }
 
 impl ClassifiedVolume {
-    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device; with [`Classification::After`] the first frame does. The labels' tables are ignored
-    /// if the volume is not segmented.
+    /// Uploads the bricks of the voxels that take part (SPEC §3) to the volume's device; with [`Classification::After`] the first frame does. The labels'
+    /// tables of channels that are not segmented are ignored. The classification must be known.
     pub fn new(
         device: &Device,
         volume: &GpuVolume,
         mut transfer: TransferFunction,
         clipped: ClippedVoxels,
-        classification: Classification,
+        splatting: &Splatting,
     ) -> Self {
-        let voxels = volume.volume();
-        keep_what_applies(voxels, &mut transfer);
-        let is_after = classification == Classification::After;
-        let taking_part = if is_after { Vec::new() } else { classify(voxels, &transfer, &clipped) };
-        let lists = BrickLists::upload(device, voxels.grid(), &taking_part);
-        Self { volume: volume.clone(), transfer, clipped, lists, revision: 0, classification, shown: None }
+        keep_what_applies(volume.volume(), &mut transfer);
+        let Splatting { classification, compositing, .. } = *splatting;
+        let mut classified = Self {
+            volume: volume.clone(),
+            transfer,
+            clipped,
+            lists: Vec::new(),
+            revision: 0,
+            classification,
+            joining: Joining::of(compositing, classification),
+            shown: None,
+        };
+        let voxels = classified.taking_part();
+        classified.lists = voxels.iter().map(|voxels| BrickLists::upload(device, classified.grid(), voxels)).collect();
+        classified
     }
 
-    /// Changes what is listed: voxels that take part, or bricks around which values meet an opacity, which the next frame finds.
-    pub(crate) fn set_classification(&mut self, classification: Classification) {
-        if classification == self.classification {
-            return;
+    /// Changes what is listed: voxels that take part in all channels or in each, or bricks around which values meet an opacity, which the next frame
+    /// finds.
+    pub(crate) fn set_splatting(&mut self, splatting: &Splatting) {
+        let Splatting { classification, compositing, .. } = *splatting;
+        let (old, count) = (self.classification, self.list_count());
+        self.classification = classification;
+        self.joining = Joining::of(compositing, classification);
+        if classification != old || self.list_count() != count {
+            self.list_again();
         }
-        let is_after = classification == Classification::After;
-        let voxels = if is_after { Vec::new() } else { classify(self.volume(), &self.transfer, &self.clipped) };
+    }
+
+    /// Lists all voxels again, which the next frame uploads.
+    fn list_again(&mut self) {
         let grid = *self.grid();
-        self.lists.replace(&grid, &voxels);
+        self.lists = self.taking_part().iter().map(|voxels| BrickLists::new(&grid, voxels)).collect();
         self.revision += 1;
-        (self.classification, self.shown) = (classification, None);
+        self.shown = None;
+    }
+
+    /// The voxels that each list holds; with [`Classification::After`] none yet.
+    fn taking_part(&self) -> Vec<Vec<u32>> {
+        let voxels = |(volume, transfer): (&Volume, Cow<'_, TransferFunction>)| match self.classification {
+            Classification::After => Vec::new(),
+            _ => classify(volume, &transfer, &self.clipped),
+        };
+        self.listed().map(voxels).collect()
+    }
+
+    /// The number of channels that are drawn.
+    fn channel_count(&self) -> usize {
+        channels(self.volume(), &self.transfer).count()
+    }
+
+    /// The number of lists.
+    fn list_count(&self) -> usize {
+        let is_apart = self.classification == Classification::After || self.joining.is_some();
+        if is_apart { self.channel_count() } else { 1 }
+    }
+
+    /// What the voxels of each list take part in.
+    fn listed(&self) -> impl Iterator<Item = (&Volume, Cow<'_, TransferFunction>)> {
+        let count = self.list_count();
+        self.volume().channels().take(count).enumerate().map(move |(number, volume)| {
+            let transfer = match count {
+                1 => Cow::Borrowed(&self.transfer),
+                _ => Cow::Owned(self.transfer.of_channel(number)),
+            };
+            (volume, transfer)
+        })
+    }
+
+    /// The channels that share sheets: all of them, or one by one where each has an image of its own; and how these images become one.
+    pub(crate) fn layers(&self) -> (Vec<Layer>, Option<Joining>) {
+        let (channels, lists) = (self.channel_count(), self.list_count());
+        match self.joining.filter(|_| channels > 1) {
+            None => (vec![Layer { channels: 0..channels, lists: 0..lists }], None),
+            joining => {
+                let layer = |number| Layer { channels: number..number + 1, lists: number..number + 1 };
+                ((0..channels).map(layer).collect(), joining)
+            }
+        }
     }
 
     /// Lists the bricks that a frame may draw. A changed transfer function tests bricks anew; their values are looked at only where what a
@@ -118,21 +163,25 @@ impl ClassifiedVolume {
             return;
         }
         let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
-        let voxels = shown.voxels(self.volume());
-        let grid = *self.grid();
-        self.lists.replace(&grid, &voxels);
+        let (volume, grid) = (Arc::clone(self.volume()), *self.grid());
+        for ((list, channel), of) in self.lists.iter_mut().zip(volume.channels()).zip(&shown.channels) {
+            list.replace(&grid, &of.voxels(channel));
+        }
         self.revision += 1;
         self.shown = Some(shown);
     }
 
-    /// What [`Self::show`] would list, in lists.
-    pub(crate) fn settled_for(&self, limits: &Limits, needs: Option<&BrickNeeds>) -> SettledBricks {
+    /// What [`Self::show`] would list, for every list.
+    pub(crate) fn settled_for(&self, limits: &Limits, needs: Option<&BrickNeeds>) -> Vec<SettledBricks> {
         match needs {
             Some(needs) if self.shown.as_ref().is_none_or(|shown| shown.needs != *needs) => {
                 let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
-                SettledBricks::of(limits, BrickList::new(self.grid(), &shown.voxels(self.volume())))
+                let bricks = |(channel, of): (&Volume, &ShownInChannel)| {
+                    SettledBricks::of(limits, BrickList::new(self.grid(), &of.voxels(channel)))
+                };
+                self.volume().channels().zip(&shown.channels).map(bricks).collect()
             }
-            _ => self.lists.settled(limits),
+            _ => self.lists.iter().map(|list| list.settled(limits)).collect(),
         }
     }
 
@@ -141,21 +190,31 @@ impl ClassifiedVolume {
     /// # Errors
     /// If the volume's labels exceed the device's limits.
     pub(crate) fn flush(&mut self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
-        if self.shades_by_label() {
+        if self.needs_labels() {
             self.volume.upload_labels(device, queue)?;
         }
-        self.lists.flush(device, queue);
+        self.lists.iter_mut().for_each(|list| list.flush(device, queue));
         Ok(())
     }
 
-    /// The values on the GPU.
+    /// Makes the next [`Self::flush`] upload everything again, because the buffers may have been lost.
+    pub(crate) fn forget(&mut self) {
+        self.lists.iter_mut().for_each(BrickLists::forget);
+    }
+
+    /// The values of all channels on the GPU.
     pub(crate) fn values(&self) -> &TextureView {
         self.volume.values()
     }
 
-    /// The first channel's colours of voxels' own.
-    pub(crate) fn colors(&self) -> Option<OwnColors<'_>> {
-        self.volume.colors()
+    /// Where the labels and colours of a layer's channels are among those of all channels.
+    pub(crate) fn stored(&self, layer: &Layer) -> Vec<Stored> {
+        self.volume.stored()[layer.channels.clone()].to_vec()
+    }
+
+    /// The colours of voxels' own of all channels, if a channel of a layer has any.
+    pub(crate) fn colors(&self, layer: &Layer) -> Option<OwnColors<'_>> {
+        self.volume.colors().filter(|_| self.stored(layer).iter().any(|stored| stored.colors > 0))
     }
 
     /// Whether any voxel is a hole.
@@ -163,16 +222,22 @@ impl ClassifiedVolume {
         self.volume().channels().any(|channel| channel.holes() > 0)
     }
 
-    /// The labels on the GPU, if shading needs them.
-    pub(crate) fn labels(&self) -> Option<&TextureView> {
-        self.volume.labels().filter(|_| self.shades_by_label())
+    /// The labels of all channels on the GPU, if shading a layer needs them.
+    pub(crate) fn labels(&self, layer: &Layer) -> Option<&TextureView> {
+        self.volume.labels().filter(|_| self.shades_by_label(layer))
     }
 
-    /// Whether shading needs labels.
-    pub(crate) fn shades_by_label(&self) -> bool {
-        let is_alone = self.transfer.further.is_empty() && self.classification == Classification::Before;
+    /// Whether shading a layer needs labels.
+    pub(crate) fn shades_by_label(&self, layer: &Layer) -> bool {
+        let is_alone = layer.channels.len() == 1 && self.classification == Classification::Before;
         let matter = if is_alone { LabelTables::matter_to_shading } else { LabelTables::matter };
-        self.transfer.labels.values().any(matter)
+        let mut channels = self.transfer.channels().skip(layer.channels.start).take(layer.channels.len());
+        channels.any(|transfer| transfer.labels.values().any(matter))
+    }
+
+    /// Whether shading any layer needs labels.
+    fn needs_labels(&self) -> bool {
+        self.layers().0.iter().any(|layer| self.shades_by_label(layer))
     }
 
     /// The volume.
@@ -205,6 +270,13 @@ impl ClassifiedVolume {
     /// examined. The labels' tables are ignored if the volume is not segmented.
     pub fn set_transfer_function(&mut self, mut transfer: TransferFunction) -> Touched {
         keep_what_applies(self.volume(), &mut transfer);
+        if transfer.further.len() != self.transfer.further.len() {
+            let listed = |lists: &[BrickLists]| lists.iter().map(BrickLists::len).sum::<u64>();
+            let old = listed(&self.lists);
+            self.transfer = transfer;
+            self.list_again();
+            return Touched { entered: listed(&self.lists), left: old, rebuilt: true };
+        }
         if self.classification == Classification::After {
             self.transfer = transfer;
             return self.look_at_bricks();
@@ -257,34 +329,50 @@ impl ClassifiedVolume {
     fn look_at_bricks(&mut self) -> Touched {
         let Some(mut shown) = self.shown.take() else { return Touched::default() };
         let volume = Arc::clone(self.volume());
-        let new = shown.ranges.shown(&volume, &self.transfer, shown.needs.bearing);
-        let old = std::mem::replace(&mut shown.are_shown, new);
-        let new = &shown.are_shown;
-        let entering = shown.ranges.voxels(&volume, |brick| new[brick] && !old[brick]);
-        let leaving = shown.ranges.voxels(&volume, |brick| old[brick] && !new[brick]);
+        let bearing = shown.needs.bearing;
+        let changes: Vec<(Vec<u32>, Vec<u32>)> = (channels(&volume, &self.transfer).zip(&mut shown.channels))
+            .map(|((channel, transfer), of)| {
+                let new = of.ranges.shown(channel, transfer, bearing);
+                let old = std::mem::replace(&mut of.are_shown, new);
+                let new = &of.are_shown;
+                let entering = of.ranges.voxels(channel, |brick| new[brick] && !old[brick]);
+                (entering, of.ranges.voxels(channel, |brick| old[brick] && !new[brick]))
+            })
+            .collect();
         self.shown = Some(shown);
-        self.change(&entering, &leaving)
+        self.change_all(&changes)
     }
 
-    fn change(&mut self, entering: &[u32], leaving: &[u32]) -> Touched {
+    /// Lets voxels enter and leave each list.
+    fn change_all(&mut self, changes: &[(Vec<u32>, Vec<u32>)]) -> Touched {
+        let mut touched = Touched::default();
+        for (list, (entering, leaving)) in changes.iter().enumerate() {
+            touched = touched.and(self.change(list, entering, leaving));
+        }
+        touched
+    }
+
+    fn change(&mut self, list: usize, entering: &[u32], leaving: &[u32]) -> Touched {
         if !entering.is_empty() || !leaving.is_empty() {
-            self.lists.change(entering, leaving);
+            self.lists[list].change(entering, leaving);
             self.revision += 1;
         }
-        Touched { entered: entering.len() as u64, left: leaving.len() as u64, rebuilt: !self.lists.has_room() }
+        let (entered, left) = (entering.len() as u64, leaving.len() as u64);
+        Touched { entered, left, rebuilt: !self.lists[list].has_room() }
     }
 
     /// Decides for some voxels, in memory order, whether they enter or leave.
     fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
-        // The closures get no types of wgpu, which in a browser belong to one thread.
-        let (volume, transfer, clipped) = (&**self.volume(), &self.transfer, &self.clipped);
-        let lists = self.lists.list();
-        let takes_part =
-            |index: u32| clipped.contain(volume.grid().voxel_at(index)) && takes_part(volume, transfer, index);
-        let (entering, leaving): (Vec<u32>, Vec<u32>) = (candidates.into_par_iter())
-            .filter(|&index| takes_part(index) != lists.contains(index))
-            .partition(|&index| !lists.contains(index));
-        self.change(&entering, &leaving)
+        let changes = |(listed, (volume, transfer)): (&BrickLists, (&Volume, Cow<'_, TransferFunction>))| {
+            // The closures get no types of wgpu, which in a browser belong to one thread.
+            let (clipped, listed, transfer) = (&self.clipped, listed.list(), &*transfer);
+            let takes_part =
+                |index: u32| clipped.contain(volume.grid().voxel_at(index)) && takes_part(volume, transfer, index);
+            let changed = candidates.par_iter().filter(|&&index| takes_part(index) != listed.contains(index));
+            changed.copied().partition(|&index| !listed.contains(index))
+        };
+        let changes: Vec<(Vec<u32>, Vec<u32>)> = self.lists.iter().zip(self.listed()).map(changes).collect();
+        self.change_all(&changes)
     }
 
     /// Changes only the iso-ranges: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches the same voxels as
@@ -304,20 +392,22 @@ impl ClassifiedVolume {
     /// Bytes of GPU memory that the volume will use once prepared.
     pub(crate) fn estimate(&self) -> Result<u64, RenderError> {
         let [values, both] = self.volume.needs()?;
-        let has_labels = self.shades_by_label() || self.volume.labels().is_some();
+        let has_labels = self.needs_labels() || self.volume.labels().is_some();
         Ok(if has_labels { both } else { values })
     }
 
     /// Bytes of GPU memory, including the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).
     pub fn gpu_bytes(&self) -> u64 {
-        self.volume.gpu_bytes() + self.lists.gpu_bytes()
+        self.volume.gpu_bytes() + self.lists.iter().map(BrickLists::gpu_bytes).sum::<u64>()
     }
 
-    /// The counts of a frame (Table 4) that are known before it is drawn.
-    pub fn totals(&self, view: &ViewGeometry, groups: &GroupSlabs) -> Totals {
+    /// The counts of a frame's layer (Table 4) that are known before it is drawn.
+    pub(crate) fn totals(&self, layer: &Layer, view: &ViewGeometry, groups: &GroupSlabs) -> Totals {
         let is_after = self.classification == Classification::After;
         let of_bricks = if is_after { Overlaps::count_planes } else { Overlaps::count };
-        let overlaps = self.lists.bricks().map(|bricks| of_bricks(bricks, view));
+        // The lists may have changed since the frame was prepared.
+        let lists = self.lists.iter().skip(layer.lists.start).take(layer.lists.len());
+        let overlaps = lists.flat_map(BrickLists::bricks).map(|bricks| of_bricks(bricks, view));
         let Overlaps { voxels, sections, slabs } = overlaps.fold(Overlaps::default(), Overlaps::and);
         // Some sheets of the first or last group may lie outside every kernel.
         let sheets_of = |first: i32| {
@@ -338,25 +428,25 @@ impl ClassifiedVolume {
     }
 }
 
-impl ShownBricks {
-    fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
-        let coefficients = needs.coefficients.as_ref().map_or(volume.values(), |exact| &exact.values);
-        let ranges = BrickRanges::new(volume.grid(), coefficients, needs.reach);
-        Self { needs: needs.clone(), are_shown: ranges.shown(volume, transfer, needs.bearing), ranges }
-    }
-
-    fn voxels(&self, volume: &Volume) -> Vec<u32> {
-        let are_shown = &self.are_shown;
-        self.ranges.voxels(volume, |brick| are_shown[brick])
+impl Touched {
+    /// The effect of two changes of different lists.
+    fn and(self, other: Self) -> Self {
+        let (entered, left) = (self.entered + other.entered, self.left + other.left);
+        Self { entered, left, rebuilt: self.rebuilt || other.rebuilt }
     }
 }
 
-/// Drops the tables of labels of a volume without labels, and the transfer functions of channels that it does not have.
+/// Drops the tables of labels of channels without labels, and the transfer functions of channels that a volume does not have.
 fn keep_what_applies(volume: &Volume, transfer: &mut TransferFunction) {
+    transfer.further.truncate(volume.further().len());
     if volume.labels().is_none() {
         transfer.labels.clear();
     }
-    transfer.further.truncate(volume.further().len());
+    for (channel, transfer) in volume.further().iter().zip(&mut transfer.further) {
+        if channel.labels().is_none() {
+            transfer.labels.clear();
+        }
+    }
 }
 
 /// The values of voxels that may enter or leave when their tables change.

@@ -11,25 +11,25 @@ use crate::stats::{Counts, StageTimes};
 
 /// The slabs that a frame's sheet groups consist of.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GroupSlabs {
+pub(crate) struct GroupSlabs {
     /// Every group's first slab, in compositing order.
-    pub firsts: Vec<i32>,
+    pub(crate) firsts: Vec<i32>,
     /// The number of sheets in a group.
-    pub sheets: u32,
+    pub(crate) sheets: u32,
 }
 
 /// The counts of a frame that are known before it is drawn.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Totals {
+pub(crate) struct Totals {
     /// The totals; 0 for counts that only the GPU knows.
-    pub counts: Counts,
+    pub(crate) counts: Counts,
     /// For every sheet group, the number of its sheets that any kernel touches.
-    pub group_sheets: Vec<u64>,
+    pub(crate) group_sheets: Vec<u64>,
 }
 
 impl Totals {
     /// The counts of a drawn frame, from its tally and the number of tiles that each group composited.
-    pub fn count(&self, tally: &Tally, tiles: &[u32]) -> Counts {
+    pub(crate) fn count(&self, tally: &Tally, tiles: &[u32]) -> Counts {
         Counts {
             voxels_shaded: tally.voxels_shaded.into(),
             sections_rasterized: tally.sections_rasterized.into(),
@@ -47,8 +47,8 @@ impl Totals {
     }
 }
 
-/// A frame's counts in GPU memory: a [`Tally`](crate::gpu::layout::Tally), the number of composited tiles per group (`[u32]`), and
-/// timestamps from `timestamps` on.
+/// A frame's counts in GPU memory: for every layer a [`Tally`](crate::gpu::layout::Tally) and the number of composited tiles per group
+/// (`[u32]`), and timestamps from `timestamps` on.
 #[derive(Debug)]
 pub(crate) struct Staging {
     pub(crate) buffer: Buffer,
@@ -59,17 +59,23 @@ pub(crate) struct Staging {
     pub(crate) period: f32,
 }
 
+/// The bytes of a layer's counts with a number of groups.
+pub(crate) fn count_bytes(groups: usize) -> u64 {
+    size_of::<Tally>() as u64 + groups as u64 * 4
+}
+
 /// A frame's counts that are being read back from the GPU.
 #[derive(Debug)]
 pub struct PendingCounts {
-    totals: Totals,
+    /// Those of every layer.
+    totals: Vec<Totals>,
     staging: Staging,
     arrival: Receiver<Result<(), BufferAsyncError>>,
 }
 
 impl PendingCounts {
     /// Requests the contents of `staging` once the submitted work is done.
-    pub(crate) fn new(totals: Totals, staging: Staging) -> Self {
+    pub(crate) fn new(totals: Vec<Totals>, staging: Staging) -> Self {
         let (sender, arrival) = channel();
         staging.buffer.map_async(wgpu::MapMode::Read, .., move |result| {
             // The receiver may have been dropped.
@@ -90,9 +96,16 @@ impl PendingCounts {
             let Staging { buffer, timestamps, stages, period } = &self.staging;
             let bytes = buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
             let (counts, times) = bytes.split_at(*timestamps as usize);
-            let (tally, tiles) = counts.split_at(size_of::<Tally>());
-            let tally = bytemuck::pod_read_unaligned(tally);
-            let counts = self.totals.count(&tally, &bytemuck::pod_collect_to_vec(tiles));
+            let mut rest = counts;
+            let mut of_layer = |totals: &Totals| {
+                let (own, others) = rest.split_at(count_bytes(totals.group_sheets.len()) as usize);
+                let (tally, tiles) = own.split_at(size_of::<Tally>());
+                rest = others;
+                totals.count(&bytemuck::pod_read_unaligned(tally), &bytemuck::pod_collect_to_vec(tiles))
+            };
+            let mut layers = self.totals.iter();
+            let mut counts = layers.next().map(&mut of_layer).unwrap_or_default();
+            layers.for_each(|totals| counts.add_channel(&of_layer(totals)));
             Ok((counts, stage_ms(stages, &bytemuck::pod_collect_to_vec(times), *period)))
         }))
     }

@@ -1,18 +1,19 @@
 //! A volume on the GPU, shared by any number of views and renderers on one device.
 
 use std::borrow::Cow;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
-use rayon::prelude::*;
-use wgpu::{Device, Limits, Queue, TextureView};
+use wgpu::{Device, Queue, TextureView};
 
-use crate::after::coefficients;
 use crate::after::normalization::Normalization;
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
+use crate::gpu::coefficients::Coefficients;
 use crate::gpu::fault::scoped;
+use crate::gpu::ramps::Stored;
 use crate::gpu::volume_texture::{OwnColors, ValueFormat, VolumeTexture};
 use crate::lists::value_list::ValueList;
-use crate::volume::Volume;
+use crate::volume::{Texel, Volume};
 
 /// A volume and its textures on a device. Clones share the textures.
 #[derive(Clone, Debug)]
@@ -25,37 +26,31 @@ struct Shared {
     device: Device,
     volume: Arc<Volume>,
     values: VolumeTexture,
-    /// The first channel's colours of voxels' own, and the number in them that stands for 1.
+    /// The colours of the channels whose voxels have their own, and the number in them that stands for 1.
     colors: Option<(VolumeTexture, u32)>,
-    /// The labels, uploaded when tables first need them.
+    /// The labels of all segmented channels, uploaded when tables first need them.
     labels: OnceLock<VolumeTexture>,
     value_list: OnceLock<ValueList>,
-    /// Of the values; `None` if all are holes.
-    numbers: OnceLock<Option<Normalization>>,
+    /// Of each channel's values.
+    numbers: OnceLock<Vec<Normalization>>,
     /// Those of the kernel that was last asked for.
-    coefficients: Mutex<Option<Arc<Coefficients>>>,
+    coefficients: Mutex<Option<ChannelCoefficients>>,
 }
 
-/// Coefficients that interpolate the values: [`coefficients::of_volume`].
+/// The coefficients of each channel for a kernel's radius and falloff.
 #[derive(Debug)]
-pub(crate) struct Coefficients {
-    /// The kernel's radius and falloff.
+struct ChannelCoefficients {
     kernel: (f64, f64),
-    /// As values; NaN at holes.
-    pub(crate) values: Arc<[f32]>,
-    /// What they are splatted as.
-    pub(crate) numbers: Normalization,
-    /// Uploaded with the first frame.
-    texture: OnceLock<VolumeTexture>,
+    channels: Vec<Arc<Coefficients>>,
 }
 
 impl GpuVolume {
-    /// Uploads a volume's values: 4 bytes per voxel, or 1 or 2 if they are whole numbers in a range of 256 or 65536, and for a volume of colours 4
-    /// bytes more, or 8 if these have more than 8 bits. Labels, 2 bytes per voxel,
-    /// follow when a view first has tables for them.
+    /// Uploads a volume's values: for each channel 4 bytes per voxel, or 1 or 2 if they are whole numbers in a range of 256 or 65536, and for a channel of
+    /// colours 4 bytes more, or 8 if these have more than 8 bits. Labels, 2 bytes per voxel and segmented channel, follow when a view first has tables
+    /// for them.
     ///
     /// # Errors
-    /// If the volume needs more layers than the device's textures have, or the device fails.
+    /// If the volume has more values than 32 bits count, or needs more layers than the device's textures have, or if the device fails.
     pub fn new(device: &Device, queue: &Queue, volume: impl Into<Arc<Volume>>) -> Result<Self, RenderError> {
         Self::new_in_chunks(device, queue, volume, &|| {})
     }
@@ -71,12 +66,13 @@ impl GpuVolume {
         written: &dyn Fn(),
     ) -> Result<Self, RenderError> {
         let volume = volume.into();
+        check_count(&volume)?;
         let all = all_values(&volume);
         let upload = || VolumeTexture::upload_in_chunks(device, queue, &all, written);
         let values = scoped(device, upload)??;
         drop(all);
-        let colors =
-            volume.colors().map(|colors| scoped(device, || VolumeTexture::upload_colors(device, queue, colors)));
+        let colors = all_colors(&volume);
+        let colors = colors.map(|colors| scoped(device, || VolumeTexture::upload_colors(device, queue, &colors)));
         let colors = colors.transpose()?.transpose()?;
         let (device, labels, value_list) = (device.clone(), OnceLock::new(), OnceLock::new());
         let (numbers, coefficients) = (OnceLock::new(), Mutex::default());
@@ -123,9 +119,11 @@ impl GpuVolume {
     pub fn gpu_bytes(&self) -> u64 {
         let colors = self.shared.colors.as_ref().map(|(texture, _)| texture);
         let textures = [Some(&self.shared.values), colors, self.shared.labels.get()];
-        let coefficients =
-            self.last_coefficients().and_then(|last| last.texture.get().map(|texture| texture.gpu_bytes));
-        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients.unwrap_or(0)
+        let coefficients: u64 = match &*self.kept_coefficients() {
+            Some(kept) => kept.channels.iter().map(|channel| channel.gpu_bytes()).sum(),
+            None => 0,
+        };
+        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients
     }
 
     /// The volume's device.
@@ -138,49 +136,62 @@ impl GpuVolume {
         self.shared.values.format
     }
 
-    /// The values, in their format.
+    /// The values of all channels, one channel after the other, in their format.
     pub(crate) fn values(&self) -> &TextureView {
         &self.shared.values.view
     }
 
-    /// The first channel's colours of voxels' own.
+    /// The colours of the channels whose voxels have their own, one channel after the other.
     pub(crate) fn colors(&self) -> Option<OwnColors<'_>> {
         self.shared.colors.as_ref().map(|(texture, full)| OwnColors { view: &texture.view, full: *full })
     }
 
-    /// The labels, `R16Uint`, if they were uploaded.
+    /// The labels of all segmented channels, one channel after the other, `R16Uint`, if they were uploaded.
     pub(crate) fn labels(&self) -> Option<&TextureView> {
         self.shared.labels.get().map(|labels| &labels.view)
     }
 
-    /// What the values are splatted as where they are classified afterwards (SPEC §9).
-    pub(crate) fn numbers(&self) -> Normalization {
-        let of_values = || Normalization::of(self.shared.volume.values().iter().copied());
-        self.shared.numbers.get_or_init(of_values).unwrap_or(Normalization::new([0.0; 2]))
+    /// Where each channel's labels and colours are among these.
+    pub(crate) fn stored(&self) -> Vec<Stored> {
+        let mut before = Stored { labels: 0, colors: 0 };
+        let stored = |channel: &Volume| {
+            let has = [channel.labels().is_some(), channel.colors().is_some()];
+            before.labels += u32::from(has[0]);
+            before.colors += u32::from(has[1]);
+            let number = |has, number| if has { number } else { 0 };
+            Stored { labels: number(has[0], before.labels), colors: number(has[1], before.colors) }
+        };
+        self.shared.volume.channels().map(stored).collect()
     }
 
-    fn last_coefficients(&self) -> Option<Arc<Coefficients>> {
-        self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    /// What each channel's values are splatted as where they are classified afterwards (SPEC §9).
+    pub(crate) fn numbers(&self) -> &[Normalization] {
+        let of_channel = |channel: &Volume| {
+            Normalization::of(channel.values().iter().copied()).unwrap_or(Normalization::new([0.0; 2]))
+        };
+        self.shared.numbers.get_or_init(|| self.shared.volume.channels().map(of_channel).collect())
     }
 
-    /// The coefficients for a kernel's radius and falloff, computed at the first request. Those of the previous kernel are dropped.
+    fn kept_coefficients(&self) -> MutexGuard<'_, Option<ChannelCoefficients>> {
+        self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Each channel's coefficients for a kernel's radius and falloff, computed at the first request. Those of the previous kernel are dropped.
     ///
     /// # Errors
-    /// If no coefficients interpolate the values: those of [`coefficients::of_volume`].
-    pub(crate) fn coefficients(&self, kernel: (f64, f64)) -> Result<Arc<Coefficients>, RenderError> {
-        if let Some(last) = self.last_coefficients().filter(|last| last.kernel == kernel) {
-            return Ok(last);
+    /// If no coefficients interpolate the values.
+    pub(crate) fn coefficients(&self, kernel: (f64, f64)) -> Result<Vec<Arc<Coefficients>>, RenderError> {
+        if let Some(kept) = self.kept_coefficients().as_ref().filter(|kept| kept.kernel == kernel) {
+            return Ok(kept.channels.clone());
         }
-        let volume = &self.shared.volume;
-        let values = coefficients::of_volume(volume, kernel)?;
-        let numbers = Normalization::of(values.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
         #[cfg_attr(
             target_family = "wasm",
             expect(clippy::arc_with_non_send_sync, reason = "a browser's wgpu belongs to one thread")
         )]
-        let found = Arc::new(Coefficients { kernel, values, numbers, texture: OnceLock::new() });
-        *self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner) = Some(Arc::clone(&found));
-        Ok(found)
+        let of_channel = |channel: &Volume| Coefficients::of_channel(channel, kernel).map(Arc::new);
+        let channels = self.shared.volume.channels().map(of_channel).collect::<Result<Vec<_>, _>>()?;
+        *self.kept_coefficients() = Some(ChannelCoefficients { kernel, channels: channels.clone() });
+        Ok(channels)
     }
 
     /// Uploads the labels, if there are any and they are not uploaded yet.
@@ -188,9 +199,9 @@ impl GpuVolume {
     /// # Errors
     /// If they need more layers than the device's textures have, or the device fails.
     pub(crate) fn upload_labels(&self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
-        if let (None, Some(labels)) = (self.shared.labels.get(), self.shared.volume.labels()) {
+        if let (None, Some(labels)) = (self.shared.labels.get(), all_labels(&self.shared.volume)) {
             // Labels whose allocation failed are not kept.
-            let labels = scoped(device, || VolumeTexture::upload_labels(device, queue, labels))??;
+            let labels = scoped(device, || VolumeTexture::upload_labels(device, queue, &labels))??;
             // Another thread may have been first; its labels are the same.
             let _ = self.shared.labels.set(labels);
         }
@@ -198,45 +209,45 @@ impl GpuVolume {
     }
 }
 
-impl Coefficients {
-    /// Bytes of GPU memory that they will take.
-    ///
-    /// # Errors
-    /// If they need more layers than textures may have.
-    pub(crate) fn estimate(&self, limits: &Limits) -> Result<u64, RenderError> {
-        Ok(VolumeTexture::estimate(limits, self.values.len() as u64, ValueFormat::Bits)?[0])
-    }
-
-    /// The bits of the numbers on the GPU, `R32Uint`.
-    ///
-    /// # Errors
-    /// If they need more layers than the device's textures have, or the device fails.
-    pub(crate) fn texture(&self, device: &Device, queue: &Queue) -> Result<&TextureView, RenderError> {
-        if self.texture.get().is_none() {
-            let numbers = self.numbers;
-            let numbers: Vec<f32> = self.values.par_iter().map(|&c| numbers.apply(f64::from(c)) as f32).collect();
-            let uploaded = scoped(device, || VolumeTexture::upload_bits(device, queue, &numbers))??;
-            // Another thread may have been first: its are the same.
-            let _ = self.texture.set(uploaded);
-        }
-        let missing = || RenderError::Readback("the coefficients' texture is gone".to_owned());
-        self.texture.get().map(|texture| &texture.view).ok_or_else(missing)
-    }
-}
-
 /// The bytes of a volume with a number of values in all channels.
 fn estimate(device: &Device, volume: &Volume, values: usize, format: ValueFormat) -> Result<[u64; 2], RenderError> {
     let limits = device.limits();
+    let segmented = volume.channels().filter(|channel| channel.labels().is_some()).count().max(1);
     let [values, _] = VolumeTexture::estimate(&limits, values as u64, format)?;
-    let [_, labels] = VolumeTexture::estimate(&limits, volume.values().len() as u64, format)?;
-    let colors = volume.colors().map_or(Ok(0), |colors| VolumeTexture::estimate_colors(&limits, colors))?;
+    let [_, labels] = VolumeTexture::estimate(&limits, (volume.values().len() * segmented) as u64, format)?;
+    let colors = all_colors(volume).map_or(Ok(0), |colors| VolumeTexture::estimate_colors(&limits, &colors))?;
     Ok([values + colors, values + colors + labels])
+}
+
+/// Checks that 32 bits count the values of all channels.
+fn check_count(volume: &Volume) -> Result<(), SettingError> {
+    let count = volume.channels().count();
+    let values = volume.values().len() as u64 * count as u64;
+    if count > 1 && values > u64::from(u32::MAX) {
+        let found = format!("{values} values in {count} channels");
+        return Err(SettingError::new("channel", found, format!("at most {}", u32::MAX)));
+    }
+    Ok(())
 }
 
 /// The values of all channels, one channel after the other.
 fn all_values(volume: &Volume) -> Cow<'_, [f32]> {
-    match volume.further() {
-        [] => Cow::Borrowed(volume.values()),
-        _ => Cow::Owned(volume.channels().flat_map(Volume::values).copied().collect()),
-    }
+    one_after_the_other(volume.channels().map(Volume::values)).unwrap_or_default()
+}
+
+/// The colours of the channels whose voxels have their own.
+fn all_colors(volume: &Volume) -> Option<Cow<'_, [Texel]>> {
+    one_after_the_other(volume.channels().filter_map(Volume::colors))
+}
+
+/// The labels of all segmented channels.
+fn all_labels(volume: &Volume) -> Option<Cow<'_, [u16]>> {
+    one_after_the_other(volume.channels().filter_map(Volume::labels))
+}
+
+/// The numbers of all channels that have any; `None` if no channel has.
+fn one_after_the_other<'a, T: Copy>(mut channels: impl Iterator<Item = &'a [T]>) -> Option<Cow<'a, [T]>> {
+    let mut all = Cow::Borrowed(channels.next()?);
+    channels.for_each(|channel| all.to_mut().extend_from_slice(channel));
+    Some(all)
 }

@@ -54,7 +54,7 @@ pub struct Frame {
     pub gradient: [f32; 4],
     /// The volume's dimensions; w is unused.
     pub dims: [u32; 4],
-    /// The ends of the colour, opacity and gradient opacity ramps in the control points, and the start of the table of labels there.
+    /// The ends of the first drawn channel's colour, opacity and gradient opacity ramps in the control points; w is unused.
     pub ramps: [u32; 4],
     /// The image's width and height in pixels.
     pub size: [u32; 2],
@@ -93,13 +93,13 @@ pub struct Frame {
     pub per_unit: f32,
     /// 1 if the light is at the eye, 0 if it is elsewhere.
     pub headlight: u32,
-    /// The last entry of the table of labels, which serves all greater labels, too.
-    pub last_label: u32,
+    /// The number of the first channel that is drawn (SPEC §10).
+    pub first_channel: u32,
     /// The number that is added to the texels of values that are whole numbers.
     pub value_offset: f32,
     /// 1 if values are whole numbers, 0 if texels are the values' bits.
     pub whole_values: u32,
-    /// The start of the table of channels in the control points, which begins with the second channel.
+    /// The start of the table of channels in the control points.
     pub channel_table: u32,
     /// Unused.
     pub padding_1: u32,
@@ -194,12 +194,12 @@ pub struct FieldPlanes {
     pub per_number: f32,
     /// Where `Σ (c - f)·g·δ / N` is shorter, it is rounding errors, and the kernel's gradient is 0.
     pub min_moment: f32,
+    /// The number of the channel whose numbers these are, among those that share sheets (SPEC §10).
+    pub channel: u32,
+    /// Its number among the channels whose colours of voxels' own are stored, from 1; 0 if it has none.
+    pub colors: u32,
     /// Unused.
     pub padding_0: f32,
-    /// Unused.
-    pub padding_1: f32,
-    /// Unused.
-    pub padding_2: f32,
 }
 
 /// A voxel that is drawn onto slab planes, as large as a [`Splat`].

@@ -3,6 +3,7 @@
 pub mod bindings;
 pub mod brick_lists;
 pub mod classified_volume;
+pub(crate) mod coefficients;
 pub(crate) mod counts;
 pub mod device;
 pub(crate) mod fault;
@@ -12,8 +13,10 @@ pub(crate) mod gpu_volume;
 pub mod layout;
 pub(crate) mod options;
 pub(crate) mod placement;
+pub mod ramps;
 pub mod render_pipeline;
 pub mod shaders;
+pub(crate) mod shown_bricks;
 pub mod targets;
 pub mod timer;
 pub mod uniforms;

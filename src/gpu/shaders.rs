@@ -48,9 +48,11 @@ pub const SHADE: Shader = shader!(
     "shade",
     "shared/frame",
     "shared/brick",
+    "shared/texels",
     "shared/volume",
     "shared/channels",
     "shared/colors",
+    "shared/own_color",
     "shared/project",
     "shared/splat",
     "shared/shading",
@@ -115,6 +117,7 @@ pub const VALUES: Shader = shader!(
     "values",
     "shared/frame",
     "shared/brick",
+    "shared/texels",
     "shared/volume",
     "shared/project",
     "shared/field_voxel",
@@ -129,7 +132,21 @@ pub const FIELD: Shader = shader!(
     "shared/field_voxel",
     "shared/planes",
     "shared/sheets",
-    "shared/corners"
+    "shared/corners",
+    "shared/plane_quads"
+);
+/// Draws colours of voxels' own onto a slab plane.
+pub const FIELD_COLORS: Shader = shader!(
+    "field_colors",
+    "shared/frame",
+    "shared/brick",
+    "shared/texels",
+    "shared/colors",
+    "shared/field_voxel",
+    "shared/planes",
+    "shared/sheets",
+    "shared/corners",
+    "shared/plane_quads"
 );
 /// Classifies, shades and composites slabs between planes.
 pub const CLASSIFY: Shader = shader!(
@@ -144,7 +161,9 @@ pub const CLASSIFY: Shader = shader!(
     "shared/means",
     "shared/planes",
     "shared/project",
+    "shared/texels",
     "shared/volume",
+    "shared/channels",
     "shared/shading",
     "shared/ramps",
     "shared/slab_integral",
@@ -173,9 +192,11 @@ pub const GATHER: Shader = shader!(
     "gather/kernel",
     "gather/economies",
     "gather/ramps",
+    "shared/texels",
     "shared/volume",
     "shared/channels",
     "shared/colors",
+    "shared/own_color",
     "shared/project",
     "shared/local_ray",
     "shared/shading",
@@ -201,6 +222,7 @@ pub const GATHER_PLANES: Shader = shader!(
     "gather/voxels",
     "gather/planes",
     "gather/ramps",
+    "shared/texels",
     "shared/volume",
     "shared/project",
     "shared/shading",
@@ -214,13 +236,16 @@ pub const GATHER_PLANES: Shader = shader!(
     "shared/slab_integral",
     "gather/slabs"
 );
+/// Adds up the images of channels that share no sheets.
+pub const JOIN: Shader =
+    shader!("join", "shared/frame", "shared/brick", "shared/band", "shared/cut", "shared/finished");
 /// Writes the depths of first hits.
 pub const FIRST_HIT: Shader = shader!("first_hit", "shared/frame", "shared/cut");
 /// Composites the result over the background.
-pub const RESOLVE: Shader = shader!("resolve", "shared/frame", "shared/band");
+pub const RESOLVE: Shader = shader!("resolve", "shared/frame", "shared/band", "shared/finished");
 
-/// Every shader, in the order of the data flow.
-pub const ALL: [Shader; 18] = [
+/// Every shader, in the order of the data flow. A page has none of tiles, for which browsers lack what they need.
+pub const ALL: &[Shader] = &[
     CULL_BRICKS,
     CULL_VOXELS,
     COMPACT,
@@ -233,10 +258,14 @@ pub const ALL: [Shader; 18] = [
     COMPOSITE,
     VALUES,
     FIELD,
+    FIELD_COLORS,
     CLASSIFY,
     OCCLUDE,
+    #[cfg(not(target_arch = "wasm32"))]
     GATHER,
+    #[cfg(not(target_arch = "wasm32"))]
     GATHER_PLANES,
+    JOIN,
     FIRST_HIT,
     RESOLVE,
 ];
@@ -244,7 +273,7 @@ pub const ALL: [Shader; 18] = [
 impl Shader {
     /// Whether workgroup memory must be zeroed. The tile rasterizer's memory is large, and it writes everything before reading it.
     pub fn needs_zeroed_memory(&self) -> bool {
-        *self != GATHER && *self != GATHER_PLANES
+        !self.stage.starts_with("gather")
     }
 
     /// The complete WGSL.

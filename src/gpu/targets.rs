@@ -1,8 +1,8 @@
 //! Buffers that depend only on the image's size: the compositing buffer, sheet buffers, opacity and occlusion buffers.
 
 use wgpu::{
-    Buffer, BufferUsages, Device, Limits, Texture, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
-    TextureViewDimension,
+    Buffer, BufferUsages, CommandEncoder, Device, Limits, Texture, TextureFormat, TextureUsages, TextureView,
+    TextureViewDescriptor, TextureViewDimension,
 };
 
 use super::bindings::{BufferSpec, buffer_spec, grown, sizes, uploaded};
@@ -58,11 +58,19 @@ impl CompositingBuffer {
     /// # Errors
     /// If the image exceeds the maximum texture size, or 32 of its rows exceed a binding.
     pub fn bands(limits: &Limits, size: [u32; 2]) -> Result<Vec<Band>, RenderError> {
+        Self::bands_for(limits, size, 1)
+    }
+
+    /// The bands of an image for which one binding holds a number of records, each of a compositing buffer's size.
+    ///
+    /// # Errors
+    /// As for [`Self::bands`].
+    pub fn bands_for(limits: &Limits, size: [u32; 2], records: u32) -> Result<Vec<Band>, RenderError> {
         let limit = |what, limit, required: u64, actual: u64| {
             if required > actual { Err(RenderError::Limit { what, limit, required, actual }) } else { Ok(()) }
         };
         let [width, height] = size;
-        let row_bytes = u64::from(width) * ACC_BYTES;
+        let row_bytes = u64::from(width) * ACC_BYTES * u64::from(records);
         let binding = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let texture = limits.max_texture_dimension_2d.into();
         limit("image.width", "max_texture_dimension_2d", width.into(), texture)?;
@@ -78,6 +86,11 @@ impl CompositingBuffer {
     /// Allocates these bands.
     pub fn new(device: &Device, size: [u32; 2], bands: &[Band]) -> Self {
         Self { size, bands: bands.iter().map(|&band| BandBuffer::new(device, size[0], band)).collect() }
+    }
+
+    /// Clears all bands.
+    pub fn clear(&self, encoder: &mut CommandEncoder) {
+        self.bands.iter().for_each(|band| encoder.clear_buffer(&band.acc, 0, None));
     }
 
     /// The size in bytes of `bands` bands.
@@ -141,6 +154,11 @@ impl Targets {
         Ok(texels * texel + sizes(limits, &masks(size))?)
     }
 
+    /// The number of sheet buffers.
+    pub fn layers(&self) -> u32 {
+        self.sheets.depth_or_array_layers()
+    }
+
     /// The number of tiles.
     pub fn tiles(&self) -> u32 {
         tile_grid(self.size).iter().product()
@@ -174,7 +192,7 @@ impl Targets {
     pub fn gpu_bytes(&self) -> u64 {
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
         let texel = u64::from(self.sheets.format().block_copy_size(None).unwrap_or(0));
-        let sheets = pixels * texel * u64::from(self.sheets.depth_or_array_layers());
+        let sheets = pixels * texel * u64::from(self.layers());
         sheets + self.masks().map(Buffer::size).iter().sum::<u64>()
     }
 }

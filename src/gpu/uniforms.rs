@@ -1,14 +1,14 @@
 //! A frame's plain data in the GPU's layout.
 
-use std::ops::{Add, Mul, Range};
+use std::ops::Range;
 
 use glam::{DMat2, DVec2, DVec3, DVec4};
 
 use super::gathered_layout::GatheredLayout;
 use super::layout::{Cut, FieldPlanes, Frame, Gather, SheetGroup};
+use super::ramps::Ramps;
 use super::volume_texture::ValueFormat;
 use crate::after::normalization::Normalization;
-use crate::after::slab_integral;
 use crate::error::setting::scaled;
 use crate::geometry::grid_warp::{self, FootprintMap};
 use crate::geometry::means::RayBox;
@@ -16,14 +16,12 @@ use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::surfaces::SurfaceDepths;
 use crate::geometry::view_geometry::{Rays, ViewGeometry};
 use crate::kernel::Kernel;
-use crate::lists::iso_range::{ValueSet, of_ordinal, ordinal};
 use crate::lists::patch_bins::PatchBins;
 use crate::lists::quad_plan::FramePlan;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
 use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
 use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
-use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::settings::window::Window;
 use crate::volume::Grid;
 
@@ -65,7 +63,7 @@ pub fn frame(
         background: DVec4::new(r * a, g * a, b * a, a).as_vec4().to_array(),
         gradient: (0.5 / grid.aspect()).extend(MIN_GRADIENT).as_vec4().to_array(),
         dims: grid.dims.extend(0).to_array(),
-        ramps: [color_end, opacity_end, gradient_opacity_end, ramps.label_table.start],
+        ramps: [color_end, opacity_end, gradient_opacity_end, 0],
         size: view.size,
         amplitude: (view.footprint.amplitude / view.lambda) as f32,
         radius: kernel.radius() as f32,
@@ -84,7 +82,7 @@ pub fn frame(
         tiles: u32::from(scene.splatting.tiles && !counts_empty_tiles(&scene.splatting)),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
-        last_label: ramps.label_table.len().saturating_sub(1) as u32,
+        first_channel: ramps.first_channel,
         value_offset: match values {
             ValueFormat::Offset8(least) | ValueFormat::Offset16(least) => least,
             ValueFormat::Bits => 0.0,
@@ -204,19 +202,11 @@ pub fn planes(
         value_bias: (offset - numbers.base) as f32,
         value_scale: numbers.scale as f32,
         per_number: numbers.scale.recip() as f32,
-        min_moment: min_moment(view.radius, numbers.range),
+        min_moment: numbers.min_moment(view.radius),
+        channel: 0,
+        colors: 0,
         padding_0: 0.0,
-        padding_1: 0.0,
-        padding_2: 0.0,
     }
-}
-
-/// The rounding error of `Σ c·g·δ / N - f·Σ g·δ / N`, whose terms are added one by one: where all values are equal it is no longer, and a direction
-/// made of it would be noise.
-fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
-    // About as many units in the last place as a kernel of the default radius reaches voxels.
-    const UNITS: f32 = 32.0;
-    UNITS * f32::EPSILON * radius as f32 * range[0].abs().max(range[1].abs())
 }
 
 /// The fraction of the kernel's ball, from the middle out, for which the polynomial for chords is fitted: where chords are long, they cut
@@ -300,138 +290,4 @@ fn half_vector(to_light: DVec3, to_eye: DVec3) -> DVec3 {
     let sum = to_light + to_eye;
     // Opposite unit vectors add up to rounding noise, not to 0.
     if sum.length() < 1e-12 { DVec3::ZERO } else { sum.normalize() }
-}
-
-/// A transfer function's control points, for the stages that shade.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ramps {
-    /// The value, then rgb or (ordinate, 0, 0); colour, opacity and gradient opacity in turn, and after them the table of their integrals
-    /// ([`slab_integral`]) if there is one: first the main ramps, then those of labels. The table of labels follows.
-    pub points: Vec<[f32; 4]>,
-    /// The end of each of the main ramps.
-    pub ends: [u32; 3],
-    /// The part of `points` that holds for every label the start of its ramps and the end of each, as numbers that are exact in `f32`. The last
-    /// entry is the main ramps', and serves all greater labels. Empty if no label has its own ramps.
-    pub label_table: Range<u32>,
-    /// The start of the part of `points` that holds the same for every channel after the first (SPEC §10).
-    pub channel_table: u32,
-    /// The number of channels.
-    pub channels: u32,
-    /// The maximum number of control points in each ramp.
-    lengths: [u32; 3],
-}
-
-impl Ramps {
-    /// All ramps of a transfer function; a missing gradient opacity is 1 everywhere.
-    pub fn new(transfer: &TransferFunction) -> Self {
-        // A voxel that takes part in one channel may be invisible in another.
-        let is_alone = transfer.further.is_empty();
-        let matter = |tables: &LabelTables| if is_alone { tables.matter_to_shading() } else { tables.matter() };
-        Self::with(transfer, matter, |_| Vec::new())
-    }
-
-    /// The same with tables of the ramps' integrals, for classification after splatting.
-    pub fn with_integrals(transfer: &TransferFunction, compositing: Compositing, numbers: &Normalization) -> Self {
-        Self::with(transfer, LabelTables::matter, |tables| slab_integral::table(tables, compositing, numbers))
-    }
-
-    fn with(
-        transfer: &TransferFunction,
-        matter: impl Fn(&LabelTables) -> bool,
-        integrals: impl Fn(&Tables) -> Vec<[f32; 4]>,
-    ) -> Self {
-        let is_alone = transfer.further.is_empty();
-        let append = |points: &mut Vec<[f32; 4]>, label| {
-            let tables = transfer.tables(label);
-            let bounds = append(points, &tables, is_alone);
-            points.extend(integrals(&tables));
-            bounds
-        };
-        let mut points = Vec::new();
-        let main @ [_, ends @ ..] = append(&mut points, None);
-        let mut all = vec![main];
-        let own: Vec<u16> =
-            (transfer.labels.iter()).filter(|(_, tables)| matter(tables)).map(|(&label, _)| label).collect();
-        let mut label_table = 0..0;
-        if let Some(&last) = own.last() {
-            let mut table = vec![main; usize::from(last) + 2];
-            for label in own {
-                table[usize::from(label)] = append(&mut points, Some(label));
-                all.push(table[usize::from(label)]);
-            }
-            label_table = points.len() as u32..(points.len() + table.len()) as u32;
-            points.extend(table.into_iter().map(|numbers| numbers.map(|number| number as f32)));
-        }
-        let further: Vec<[u32; 4]> =
-            transfer.further.iter().map(|transfer| self::append(&mut points, &transfer.tables(None), false)).collect();
-        all.extend(&further);
-        let (channel_table, channels) = (points.len() as u32, 1 + further.len() as u32);
-        points.extend(further.into_iter().map(|numbers| numbers.map(|number| number as f32)));
-        let lengths = [0, 1, 2].map(|ramp| all.iter().map(|ends| ends[ramp + 1] - ends[ramp]).max().unwrap_or(0));
-        Self { points, ends, label_table, channel_table, channels, lengths }
-    }
-
-    /// The maximum number of control points in each ramp, over all labels and channels.
-    pub fn lengths(&self) -> [u32; 3] {
-        self.lengths
-    }
-}
-
-/// Appends the control points of a label's ramps. Returns their start, and the end of each. Unless the channel is alone, the opacity is 0 at values
-/// with which its voxels do not take part: they may be drawn for another channel.
-fn append(points: &mut Vec<[f32; 4]>, tables: &Tables, is_alone: bool) -> [u32; 4] {
-    let mut bounds = [points.len() as u32; 4];
-    let scalar = |(at, y): (f64, f64)| DVec4::new(at, y, 0.0, 0.0);
-    let color = in_f32(tables.color).into_iter().map(|(at, rgb)| DVec4::new(at, rgb.x, rgb.y, rgb.z)).collect();
-    let opacity = if is_alone { in_f32(tables.opacity) } else { in_f32(&visible_opacity(tables)) };
-    let opacity = opacity.into_iter().map(scalar).collect();
-    let gradient_opacity = tables.gradient_opacity.map_or(vec![(0.0, 1.0)], in_f32).into_iter().map(scalar).collect();
-    let ramps: [Vec<DVec4>; 3] = [color, opacity, gradient_opacity];
-    for (end, ramp) in bounds[1..].iter_mut().zip(ramps) {
-        points.extend(ramp.iter().map(|point| point.as_vec4().to_array()));
-        *end = points.len() as u32;
-    }
-    bounds
-}
-
-/// The opacity of `f32` values, 0 at those outside the iso-ranges and where nothing is visible.
-fn visible_opacity(tables: &Tables) -> Ramp<f64> {
-    if tables.visible && tables.iso_ranges.is_none() {
-        return tables.opacity.clone();
-    }
-    let ends = [f32::MIN, f32::MAX].map(ordinal);
-    let mut points: Vec<(f64, f64)> = Vec::new();
-    for range in ValueSet::of_tables(tables).ranges() {
-        let [first, last] = [range.start, range.end - 1].map(|at| at.clamp(ends[0], ends[1]));
-        let inner = tables
-            .opacity
-            .points()
-            .iter()
-            .filter(|point| f64::from(of_ordinal(first)) < point.0 && point.0 < f64::from(of_ordinal(last)));
-        let value = |at: u32| f64::from(of_ordinal(at));
-        let seen = |at: u32| (value(at), tables.opacity.at(value(at)));
-        // Between neighbouring numbers there are no values.
-        points.extend((first > ends[0]).then(|| (value(first - 1), 0.0)));
-        points.push(seen(first));
-        points.extend(inner);
-        points.push(seen(last));
-        points.extend((last < ends[1]).then(|| (value(last + 1), 0.0)));
-    }
-    // A range of one value, and one that begins right behind another's end, give points twice.
-    points.dedup_by_key(|point| point.0);
-    Ramp::new(points).unwrap_or_else(|_| Ramp::through(vec![(0.0, 0.0)]))
-}
-
-/// A ramp's control points, clipped to the range of `f32`, like values.
-fn in_f32<T>(ramp: &Ramp<T>) -> Vec<(f64, T)>
-where
-    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
-{
-    let limit = f64::from(f32::MAX);
-    let given = ramp.points();
-    let cut = |at: f64| Some((at, ramp.at(at)));
-    let before = cut(-limit).filter(|_| given.iter().any(|point| point.0 <= -limit));
-    let after = cut(limit).filter(|_| given.iter().any(|point| point.0 >= limit));
-    let between = given.iter().copied().filter(|point| point.0.abs() < limit);
-    before.into_iter().chain(between).chain(after).collect()
 }

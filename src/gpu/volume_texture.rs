@@ -1,12 +1,12 @@
 //! The volume's values, labels and colours on the GPU, as texture arrays, whose size is not limited by one binding. Layers have 2048 texels a side, or
 //! 4096 or 8192 if a volume would need more layers than the device has; with WebGPU's default limits 2048 suffice.
 
-use rayon::prelude::*;
 use wgpu::{
     Device, Extent3d, Limits, Queue, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
 };
 
 use crate::error::RenderError;
+use crate::parallel::prelude::*;
 use crate::volume::Texel;
 
 /// The smallest of [`SIDES`].
@@ -57,6 +57,9 @@ pub struct OwnColors<'a> {
     /// The number that stands for 1.
     pub full: u32,
 }
+
+/// The format of four numbers for each voxel.
+const COLOR_BITS: TextureFormat = TextureFormat::Rgba32Uint;
 
 /// The format of labels, whose texels are the labels themselves.
 const LABELS: ValueFormat = ValueFormat::Offset16(0.0);
@@ -119,6 +122,28 @@ impl VolumeTexture {
         Ok(uploaded)
     }
 
+    /// Uploads the bits of four numbers for each voxel, `Rgba32Uint`.
+    ///
+    /// # Errors
+    /// See [`Self::upload`].
+    pub fn upload_color_bits(device: &Device, queue: &Queue, numbers: &[[f32; 4]]) -> Result<Self, RenderError> {
+        let side = side(&device.limits(), "the coefficients of the volume's colours", numbers.len() as u64)?;
+        let size = folded(numbers.len() as u64, side);
+        let (texture, uploaded) =
+            Self::new_as(device, "sheetsplat.color_coefficients", ValueFormat::Bits, COLOR_BITS, size);
+        fill(queue, &texture, numbers, |color| color.map(f32::to_bits), &|| {});
+        Ok(uploaded)
+    }
+
+    /// The size in bytes of four numbers for each voxel.
+    ///
+    /// # Errors
+    /// If they need more layers than textures may have.
+    pub fn estimate_color_bits(limits: &Limits, voxels: u64) -> Result<u64, RenderError> {
+        let side = side(limits, "the coefficients of the volume's colours", voxels)?;
+        Ok(bytes_as(COLOR_BITS, folded(voxels, side)))
+    }
+
     /// Like [`Self::upload`], with layers of a given side, necessary or not.
     pub fn upload_folded(device: &Device, queue: &Queue, values: &[f32], side: u32) -> Self {
         Self::fold(device, queue, values, side, &|| {})
@@ -135,7 +160,7 @@ impl VolumeTexture {
         uploaded
     }
 
-    /// Uploads a segmented volume's labels, `R16Uint`.
+    /// Uploads the labels of segmented channels, one channel after the other, `R16Uint`.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have.
@@ -146,7 +171,7 @@ impl VolumeTexture {
         Ok(uploaded)
     }
 
-    /// Uploads colours of voxels' own, with the number that stands for 1: `Rgba8Uint` if that reproduces them, else `Rgba16Uint`.
+    /// Uploads colours of voxels' own, one channel after the other, with the number that stands for 1: `Rgba8Uint` if that reproduces them, else `Rgba16Uint`.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have.

@@ -19,12 +19,6 @@ impl Backend {
     }
 }
 
-/// Whether a view that the GPU does not draw is drawn by the CPU: unless something asks for the GPU.
-#[cfg(all(feature = "gpu", feature = "cpu"))]
-pub(super) fn may_leave_gpu<'a>(options: &HeadlessOptions, scenes: impl IntoIterator<Item = &'a Scene>) -> bool {
-    options.backend == Backend::Auto && !names_gpu(options) && !scenes.into_iter().any(is_for_gpu)
-}
-
 /// Whether options ask for the GPU.
 #[cfg(feature = "gpu")]
 fn names_gpu(options: &HeadlessOptions) -> bool {

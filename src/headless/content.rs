@@ -31,8 +31,8 @@ pub(super) fn content(
         let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, buffer)?);
         crop(&pixels, (frame, band.band.first_row), region, &mut colors);
     }
-    let extremes = match &frame.drawing {
-        Drawing::Fields(fields) if chosen.is_some() => {
+    let extremes = match frame.first_drawing() {
+        Some(Drawing::Fields(fields)) if chosen.is_some() => {
             extremes((device, queue), frame, fields.chosen(), region, &colors)?
         }
         _ => Vec::new(),

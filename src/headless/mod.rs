@@ -44,9 +44,6 @@ use crate::volume::{StreamedVolume, Volume, VolumeError};
 #[derive(Debug)]
 pub struct Headless {
     drawer: Drawer,
-    /// Whether the CPU draws what the GPU does not.
-    #[cfg(all(feature = "gpu", feature = "cpu"))]
-    may_leave_gpu: bool,
 }
 
 #[derive(Debug)]
@@ -68,8 +65,7 @@ impl Headless {
     }
 
     /// As [`Self::new`], for scenes that are known: [`Backend::Auto`] takes the GPU if one of them names a rasterizer, or uses a setting that
-    /// the CPU backend does not draw. A view that only the CPU draws, such as some of several channels, it then leaves to the CPU, unless
-    /// something asks for the GPU.
+    /// the CPU backend does not draw.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -77,9 +73,6 @@ impl Headless {
         options: &HeadlessOptions,
         scenes: impl IntoIterator<Item = &'a Scene>,
     ) -> Result<Self, DeviceError> {
-        let scenes: Vec<&Scene> = scenes.into_iter().collect();
-        #[cfg(all(feature = "gpu", feature = "cpu"))]
-        let may_leave_gpu = backend::may_leave_gpu(options, scenes.iter().copied());
         let drawer = match Backend::resolved(options, scenes) {
             #[cfg(feature = "gpu")]
             Backend::Gpu => Drawer::Gpu(Box::new(GpuHeadless::new(options)?)),
@@ -88,11 +81,7 @@ impl Headless {
             Backend::Reference => Drawer::Reference,
             backend => return Err(DeviceError::MissingBackend { backend: backend.name() }),
         };
-        Ok(Self {
-            drawer,
-            #[cfg(all(feature = "gpu", feature = "cpu"))]
-            may_leave_gpu,
-        })
+        Ok(Self { drawer })
     }
 
     /// The backend that draws; never [`Backend::Auto`].
@@ -168,11 +157,6 @@ impl Headless {
             OpenVolume::Streamed(volume) => return self.stream(volume, scene),
         };
         let reads = volume.reads();
-        #[cfg(all(feature = "gpu", feature = "cpu"))]
-        if self.may_leave_gpu && crate::renderer::scene_view::check_channels(&volume, scene).is_err() {
-            log::info!("drawn by the CPU: the GPU does not draw this volume's channels with these settings");
-            return Ok(HeadlessView::new(ViewBackend::Cpu(Box::new(CpuRenderer::new(volume, scene)?)), reads));
-        }
         let backend = match &self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(gpu) => ViewBackend::Gpu(Box::new(gpu.view(volume, scene)?)),
@@ -283,10 +267,6 @@ impl Headless {
     /// Whether views of the CPU are drawn.
     #[cfg(feature = "cpu")]
     fn draws_by_cpu(&self) -> bool {
-        #[cfg(feature = "gpu")]
-        if self.may_leave_gpu {
-            return true;
-        }
         matches!(self.drawer, Drawer::Cpu)
     }
 
@@ -330,34 +310,4 @@ fn view_and_draw<View>(
 
 fn milliseconds_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
-}
-
-#[cfg(all(test, feature = "gpu", feature = "cpu"))]
-#[expect(clippy::unwrap_used, reason = "tests")]
-mod tests {
-    use super::*;
-    use crate::settings::splatting::Classification;
-
-    #[test]
-    fn what_the_gpu_does_not_draw_is_left_to_the_cpu() {
-        let gpu = GpuHeadless::new(&HeadlessOptions::default().with_adapter("llvmpipe")).unwrap();
-        let mut headless = Headless { drawer: Drawer::Gpu(Box::new(gpu)), may_leave_gpu: true };
-        let sets = ["image={width=24,height=24}".to_owned()];
-        let mut scene = Scene::from_volume(crate::scene::VolumeSource::Builtin("head:12".to_owned()), &sets).unwrap();
-        let volume = scene.load_volume().unwrap();
-        let channels = volume.clone().with_channels("test", vec![volume]).unwrap();
-        for (classification, backend) in [(Classification::Before, Backend::Gpu), (Classification::After, Backend::Cpu)]
-        {
-            scene.splatting.classification = classification;
-            let rendering = headless.render_volume(channels.clone(), &scene).unwrap();
-            assert_eq!(rendering.stats.backend, backend.name(), "{classification:?}");
-        }
-        assert_eq!(
-            headless.render_volume(channels.clone(), &scene).unwrap().image,
-            crate::cpu::render(channels.clone(), &scene).unwrap().image
-        );
-        headless.may_leave_gpu = false;
-        let message = headless.render_volume(channels, &scene).unwrap_err().to_string();
-        assert!(message.starts_with("splatting.classification: found \"after\" for 2 channels"), "{message}");
-    }
 }

@@ -1,7 +1,6 @@
 //! Classification (SPEC §3): which voxels take part. Shading determines their appearance.
 
-use rayon::prelude::*;
-
+use crate::parallel::prelude::*;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;

@@ -1,10 +1,10 @@
 //! The extent of the voxels that take part.
 
 use glam::UVec3;
-use rayon::prelude::*;
 
 use super::classify::{channels, takes_part};
 use super::iso_range::ValueSet;
+use crate::parallel::prelude::*;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;

@@ -4,7 +4,6 @@
 use std::ops::Range;
 
 use glam::DVec2;
-use rayon::prelude::*;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
@@ -13,6 +12,8 @@ use crate::geometry::slab::SlabGrid;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
+use crate::parallel;
+use crate::parallel::prelude::*;
 use crate::settings::splatting::Order;
 
 /// The width and height of the rasterizer's patches in pixels.
@@ -188,7 +189,7 @@ impl PatchBins {
             .collect();
 
         let sort = Sort { placed: &placed, half_boxes: &half_boxes, order, first_group, size: view.size };
-        let strip_rows = rows.div_ceil(STRIPS_PER_THREAD * rayon::current_num_threads() as u32).max(1);
+        let strip_rows = rows.div_ceil(STRIPS_PER_THREAD * parallel::current_num_threads() as u32).max(1);
         let strips = (0..rows).into_par_iter().step_by(strip_rows as usize);
         let strips: Vec<_> = strips.map(|first| sort.counted(first..(first + strip_rows).min(rows))).collect();
         let total = strips.iter().map(|strip| strip.entries).sum();

@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use glam::DVec4;
-use rayon::prelude::*;
 
 use crate::geometry::slab::{self, SlabGrid};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 use crate::lists::bucket::Buckets;
+use crate::parallel::prelude::*;
 use crate::settings::splatting::Order;
 
 /// The side of a tile in pixels (§6).
@@ -153,7 +153,9 @@ impl Overlaps {
                 slabs: first.floor() as i32..((middle + spread).ceil() as i32).max(first.floor() as i32),
             }
         };
-        bricks.par_iter().map(of_brick).reduce(Self::default, Self::and)
+        // Bricks whose voxels have all left stay in their lists.
+        let has_voxels = |brick: &&Brick| brick::present(brick) != 0;
+        bricks.par_iter().filter(has_voxels).map(of_brick).reduce(Self::default, Self::and)
     }
 
     /// The counts of two lists of bricks together.

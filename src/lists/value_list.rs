@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::lists::iso_range::{ValueSet, ordinal};
+use crate::parallel::prelude::*;
 
 /// The relevant voxels of a volume, which exclude holes and voxels of the minimum value, sorted by value and then by index.
 #[derive(Clone, Debug, PartialEq, Eq)]

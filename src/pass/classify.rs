@@ -31,16 +31,20 @@ pub struct ClassifyMode {
     pub labels: bool,
     /// Whether any voxel is a hole.
     pub holes: bool,
+    /// The number of channels that share sheets (SPEC §10).
+    pub channels: u32,
+    /// Whether voxels of any channel have colours of their own.
+    pub own_colors: bool,
 }
 
 /// The stage's buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct ClassifyBuffers<'a> {
-    /// Those of the stage composite; the sheets hold the sums of a plane.
+    /// Those of the stage composite; the sheets hold the sums of a plane, two for each channel, then one for each channel with colours.
     pub composite: CompositeBuffers<'a>,
-    /// Control points of the ramps, and the tables of their integrals.
+    /// Control points of the ramps, the tables of their integrals, and those of labels and channels.
     pub control_points: &'a Buffer,
-    /// One [`FieldPlanes`].
+    /// One [`FieldPlanes`], of any channel.
     pub planes: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
@@ -55,7 +59,7 @@ pub struct ClassifyGroup {
     stage: Arc<ComputeStage>,
 }
 
-/// Bytes that a pixel carries from plane to plane.
+/// Bytes that a pixel carries from plane to plane for each channel, and for its colours.
 pub const CARRIED_BYTES: u64 = 16;
 
 impl Classify {
@@ -100,7 +104,7 @@ impl Classify {
 }
 
 fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
-    let ClassifyMode { composite, gradient, labels, holes } = mode;
+    let ClassifyMode { composite, gradient, labels, holes, channels, own_colors } = mode;
     let stage = ShaderStages::COMPUTE;
     let own = [
         ("control_points", storage::<[f32; 4]>(stage, true)),
@@ -111,8 +115,13 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
     ];
     let slots = [&slots()[..], &own].concat();
     let flag = |is_set| f64::from(u8::from(is_set));
-    let own =
-        [("KERNEL_GRADIENT", flag(gradient == Gradient::Kernel)), ("LABELS", flag(labels)), ("HOLES", flag(holes))];
+    let own = [
+        ("KERNEL_GRADIENT", flag(gradient == Gradient::Kernel)),
+        ("LABELS", flag(labels)),
+        ("HOLES", flag(holes)),
+        ("CHANNELS", f64::from(channels)),
+        ("OWN_COLORS", flag(own_colors)),
+    ];
     let constants = [&composite.constants()[..], &own].concat();
     ComputeStage::new(device, shaders::CLASSIFY, "main", &slots, &constants)
 }

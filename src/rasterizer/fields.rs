@@ -1,7 +1,9 @@
 //! The quad rasterizer with classification after splatting (SPEC §9): for every slab plane the stages cull, values, tiles, field, classify and
-//! occlude. Once two neighbouring planes are drawn, the slab between them is classified.
+//! occlude. Once two neighbouring planes are drawn, the slab between them is classified. Channels that share sheets (SPEC §10) have lists and sums of
+//! their own; classify adds up their sheets.
 
 use std::ops::Range;
+use std::sync::OnceLock;
 
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
@@ -11,6 +13,7 @@ use crate::error::RenderError;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes};
 use crate::gpu::counts::GroupSlabs;
 use crate::gpu::layout::{Brick, FieldPlanes};
+use crate::gpu::ramps::Stored;
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
@@ -20,6 +23,7 @@ use crate::pass::classify::{CARRIED_BYTES, Classify, ClassifyBuffers, ClassifyGr
 use crate::pass::composite::CompositeMode;
 use crate::pass::cull::{Cull, CullList};
 use crate::pass::field::{self, Field};
+use crate::pass::field_colors::{ColorMode, FieldColors, FieldColorsBuffers, FieldColorsGroup};
 use crate::pass::occlude::Occlude;
 use crate::pass::tiles::Tiles;
 use crate::pass::values::PlaneBuffers;
@@ -34,6 +38,8 @@ pub(crate) struct FieldRasterizer {
     cull: Cull,
     tiles: Tiles,
     field: Field,
+    /// For colours of voxels' own, compiled when first needed.
+    colors: OnceLock<FieldColors>,
     classify: Classify,
     occlude: Occlude,
 }
@@ -43,13 +49,15 @@ pub(crate) struct FieldRasterizer {
 pub(crate) struct FieldFrame {
     groups: SheetGroups,
     order: Order,
-    /// The minimum and maximum number of the coefficients.
+    /// The minimum and maximum number of the first channel's coefficients.
     range: [f32; 2],
-    planes: Buffer,
+    channels: Vec<PreparedChannel>,
+    /// The lists of all channels, one channel after the other.
     lists: Vec<PreparedList>,
-    sheet_views: Vec<TextureView>,
     gradient: Gradient,
     clear_group: BindGroup,
+    /// For colours, if there are any.
+    clear_color: Option<BindGroup>,
     /// For every band what its pixels carry from plane to plane.
     carried: Vec<Buffer>,
     classify_groups: Vec<ClassifyGroup>,
@@ -59,7 +67,7 @@ pub(crate) struct FieldFrame {
 /// Where the numbers are that pixels have chosen.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ChosenNumbers<'a> {
-    /// For every band what its pixels carry: the last of four words is the number, or 1e30 where no plane has a point.
+    /// For every band what its pixels carry: the last of four words is the number, or 1e30 where no plane has a point. There is one channel.
     pub(crate) carried: &'a [Buffer],
     /// One word per tile, 0 where nothing is carried.
     pub(crate) last_groups: &'a Buffer,
@@ -67,10 +75,24 @@ pub(crate) struct ChosenNumbers<'a> {
     pub(crate) range: [f32; 2],
 }
 
+/// A channel, which has sums of its own.
+#[derive(Debug)]
+struct PreparedChannel {
+    /// One [`FieldPlanes`].
+    planes: Buffer,
+    /// The layers of its sums.
+    sheets: Vec<TextureView>,
+    /// That of its colours, if voxels have their own.
+    colors: Option<TextureView>,
+}
+
 #[derive(Debug)]
 struct PreparedList {
+    /// The channel's number among those that share sheets.
+    channel: usize,
     cull: CullList,
     field_group: BindGroup,
+    color_group: Option<FieldColorsGroup>,
 }
 
 impl FieldRasterizer {
@@ -81,6 +103,7 @@ impl FieldRasterizer {
             cull: Cull::of_planes(device),
             tiles: Tiles::of_planes(device),
             field: Field::new(device, sheet_format),
+            colors: OnceLock::new(),
             classify: Classify::new(device),
             occlude: Occlude::new(device),
         }
@@ -96,42 +119,65 @@ impl FieldRasterizer {
         after: &After,
         previous: Option<FieldFrame>,
     ) -> Result<(FieldFrame, Prepared), RenderError> {
-        let FrameInputs { device, volume, request, frame, .. } = inputs;
+        let FrameInputs { device, request, frame, .. } = inputs;
         let (view, splatting) = (&after.view, &request.splatting);
-        let (old_groups, old_planes, old_carried, old_lists) = match previous {
-            Some(FieldFrame { groups, planes, carried, lists, .. }) => (Some(groups), Some(planes), carried, lists),
-            None => (None, None, Vec::new(), Vec::new()),
+        let (old_groups, old_channels, old_carried, old_lists) = match previous {
+            Some(FieldFrame { groups, channels, carried, lists, .. }) => (Some(groups), channels, carried, lists),
+            None => (None, Vec::new(), Vec::new(), Vec::new()),
         };
-        let covered = &covered(volume.lists.bricks(), after);
-        let (format, layers) = (self.sheet_format, field::SHEETS_PER_PLANE);
+        let covered = &covered(inputs.bricks(), after);
+        let (format, layers) = (self.sheet_format, layers(request));
         let settings = GroupSettings { view, covered, drawn: &drawn(request), sheets: 1, format, layers };
         let group_bytes = |plan: &FramePlan, stride| uniforms::plane_groups(plan, &after.planes, splatting, stride);
         let (groups, bucketed) = SheetGroups::prepare(inputs, settings, &self.tiles, group_bytes, old_groups)?;
-        let numbers = uniforms::planes(&after.planes, view, volume.gpu_volume().value_format(), &after.numbers);
-        let bytes = bytemuck::bytes_of(&numbers);
-        let planes = inputs.filled(old_planes, "sheetsplat.planes", bytes, BufferUsages::UNIFORM)?;
-        let lists = self.prepare_lists(inputs, after, (&groups, &planes), old_lists)?;
-        let pixels = |rows: u32| u64::from(view.size[0]) * u64::from(rows);
+        let channels = Self::prepare_channels(inputs, after, &groups, old_channels)?;
+        let lists = self.prepare_lists(inputs, after, (&groups, &channels), old_lists)?;
         let mut old_carried = old_carried.into_iter();
         let carried = (inputs.compositing.bands.iter())
-            .map(|band| grown(device, old_carried.next(), &carried(pixels(band.band.rows))))
+            .map(|band| grown(device, old_carried.next(), &carried(request, band.band.rows)))
             .collect::<Result<Vec<Buffer>, RenderError>>()?;
         self.field.prepare(device, after.gradient);
         let SheetGroups { targets, tile_lists, .. } = &groups;
+        let colors = self.colors.get().filter(|_| request.colored() > 0);
         let frame = FieldFrame {
             clear_group: self.field.bind_clear(device, frame, &tile_lists.composited),
-            classify_groups: self.bind_bands(inputs, after, (&groups, &planes), &carried),
+            clear_color: colors.map(|colors| colors.bind_clear(device, frame, &tile_lists.composited)),
+            classify_groups: self.bind_bands(inputs, after, (&groups, &channels), &carried),
             occlude_groups: self.occlude.bind(device, [frame, &groups.groups], &tile_lists.occluding, targets),
-            sheet_views: (0..layers).map(|layer| targets.sheet_view(layer)).collect(),
             gradient: after.gradient,
             order: splatting.order,
-            range: after.numbers.range,
+            range: after.numbers[0].range,
             groups,
-            planes,
+            channels,
             lists,
             carried,
         };
         Ok((frame, Prepared { bucketed, tabled: false }))
+    }
+
+    /// Prepares what each channel is drawn by.
+    fn prepare_channels(
+        inputs: FrameInputs<'_>,
+        after: &After,
+        groups: &SheetGroups,
+        old: Vec<PreparedChannel>,
+    ) -> Result<Vec<PreparedChannel>, RenderError> {
+        let FrameInputs { volume, request, .. } = inputs;
+        let mut old = old.into_iter().map(|old| old.planes);
+        let per_plane = field::SHEETS_PER_PLANE;
+        let mut color_layers = request.stored.len() as u32 * per_plane..;
+        let prepare = |(channel, stored): (usize, &Stored)| -> Result<PreparedChannel, RenderError> {
+            let planes = request.planes(after, channel, volume.gpu_volume().value_format());
+            let bytes = bytemuck::bytes_of(&planes);
+            let layers = channel as u32 * per_plane..(channel as u32 + 1) * per_plane;
+            let color_layer = if stored.colors > 0 { color_layers.next() } else { None };
+            Ok(PreparedChannel {
+                planes: inputs.filled(old.next(), "sheetsplat.planes", bytes, BufferUsages::UNIFORM)?,
+                sheets: layers.map(|layer| groups.targets.sheet_view(layer)).collect(),
+                colors: color_layer.map(|layer| groups.targets.sheet_view(layer)),
+            })
+        };
+        request.stored.iter().enumerate().map(prepare).collect()
     }
 
     /// Prepares culling and drawing for every list of bricks.
@@ -139,23 +185,35 @@ impl FieldRasterizer {
         &self,
         inputs: FrameInputs<'_>,
         after: &After,
-        (groups, planes): (&SheetGroups, &Buffer),
+        (groups, channels): (&SheetGroups, &[PreparedChannel]),
         old: Vec<PreparedList>,
     ) -> Result<Vec<PreparedList>, RenderError> {
-        let FrameInputs { device, queue, volume, frame, .. } = inputs;
-        let coefficients = match &after.needs.coefficients {
-            Some(exact) => Some(exact.texture(device, queue)?),
-            None => None,
-        };
-        let buffers = groups.cull_buffers(inputs, Some(PlaneBuffers { planes, coefficients }));
+        let FrameInputs { device, queue, request, frame, .. } = inputs;
         let mut old = old.into_iter().map(|old| old.cull);
-        (volume.lists.lists.iter().zip(&groups.planned.orders).zip(&groups.planned.most))
-            .map(|((list, order), &most)| {
+        let mut planned = groups.planned.orders.iter().zip(&groups.planned.most);
+        let mut prepared = Vec::new();
+        for (channel, (of, bricks)) in channels.iter().zip(inputs.lists()).enumerate() {
+            let exact = after.needs.coefficients.as_ref().map(|all| &all[request.layer.channels.start + channel]);
+            let coefficients = exact.map(|exact| exact.texture(device, queue)).transpose()?;
+            let colors = match (exact, inputs.colors().filter(|_| of.colors.is_some())) {
+                (Some(exact), Some(_)) => exact.color_texture(device, queue)?.map(|view| (ColorMode::Exact, view)),
+                (None, Some(own)) => Some((ColorMode::Smooth { full: own.full }, own.view)),
+                (_, None) => None,
+            };
+            let planes = &of.planes;
+            let buffers = groups.cull_buffers(inputs, Some(PlaneBuffers { planes, coefficients }));
+            for (list, (order, &most)) in bricks.lists.iter().zip(&mut planned) {
                 let cull = self.cull.prepare(device, buffers, list, order, most, old.next())?;
                 let field_group = self.field.bind(device, [frame, &groups.groups, planes], &cull);
-                Ok(PreparedList { cull, field_group })
-            })
-            .collect()
+                let color_group = colors.map(|(mode, colors)| {
+                    let stage = self.colors.get_or_init(|| FieldColors::new(device, self.sheet_format));
+                    let (groups, bricks) = (&groups.groups, &list.buffer);
+                    stage.bind(device, mode, FieldColorsBuffers { frame, groups, planes, bricks, colors }, &cull)
+                });
+                prepared.push(PreparedList { channel, cull, field_group, color_group });
+            }
+        }
+        Ok(prepared)
     }
 
     /// Binds the stage classify to every band of the compositing buffer.
@@ -163,7 +221,7 @@ impl FieldRasterizer {
         &self,
         inputs: FrameInputs<'_>,
         after: &After,
-        (groups, planes): (&SheetGroups, &Buffer),
+        (groups, channels): (&SheetGroups, &[PreparedChannel]),
         carried: &[Buffer],
     ) -> Vec<ClassifyGroup> {
         let FrameInputs { device, volume, request, control_points, compositing, .. } = inputs;
@@ -171,15 +229,17 @@ impl FieldRasterizer {
         let buffers = ClassifyBuffers {
             composite: groups.composite_buffers(inputs, sheets),
             control_points,
-            planes,
+            planes: &channels[0].planes,
             values: volume.values(),
-            labels: volume.labels(),
+            labels: inputs.labels(),
         };
         let mode = ClassifyMode {
             composite: CompositeMode { compositing: request.splatting.compositing, rays: request.rays },
             gradient: after.gradient,
-            labels: volume.shades_by_label(),
+            labels: volume.shades_by_label(&request.layer),
             holes: volume.has_holes(),
+            channels: channels.len() as u32,
+            own_colors: request.colored() > 0,
         };
         let bands = compositing.bands.iter().zip(carried);
         bands.map(|band| self.classify.bind(device, mode, buffers, band)).collect()
@@ -202,13 +262,14 @@ impl FieldRasterizer {
         let plan = FramePlan::new(lists.iter().copied(), after.view, 1, order, covered, &drawn);
         let group_bytes = uniforms::plane_groups(&plan, &after.planes, &request.splatting, group_stride(limits));
         let mut buffers = SheetGroups::buffer_specs(request, &plan, &group_bytes, lists);
-        buffers.push(content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM));
-        buffers.extend(request.bands.iter().map(|band| carried(u64::from(size[0]) * u64::from(band.rows))));
-        let targets = Targets::estimate(limits, size, sheet_format, field::SHEETS_PER_PLANE)?;
+        let planes = || content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM);
+        buffers.extend(request.stored.iter().map(|_| planes()));
+        buffers.extend(request.bands.iter().map(|band| carried(request, band.rows)));
+        let targets = Targets::estimate(limits, size, sheet_format, layers(request))?;
         Ok(FrameEstimate {
             bytes: sizes(limits, &buffers)? + targets,
             groups: plan.groups.len(),
-            passes: SheetGroups::passes(&plan),
+            passes: SheetGroups::passes(&plan, request.records() as usize),
         })
     }
 
@@ -224,10 +285,22 @@ impl FieldRasterizer {
             self.tiles.record(&mut pass, tile_lists, any_offset);
             drop(pass);
 
-            let clear = (&frame.clear_group, &tile_lists.composited);
-            let draws = lists.iter().map(|(list, offset)| (&list.field_group, *offset, &list.cull.draw_args));
-            let times = timer.as_mut().map(|timer| timer.render("field"));
-            self.field.record(encoder, times, frame.gradient, &frame.sheet_views, clear, draws);
+            for (number, channel) in frame.channels.iter().enumerate() {
+                let clear = (&frame.clear_group, &tile_lists.composited);
+                let of_channel = || lists.iter().filter(move |(list, _)| list.channel == number);
+                let draws = of_channel().map(|(list, offset)| (&list.field_group, *offset, &list.cull.draw_args));
+                let times = timer.as_mut().map(|timer| timer.render("field"));
+                self.field.record(encoder, times, frame.gradient, &channel.sheets, clear, draws);
+                let (Some(stage), Some(sheet), Some(clear)) = (self.colors.get(), &channel.colors, &frame.clear_color)
+                else {
+                    continue;
+                };
+                let draws = of_channel().filter_map(|(list, offset)| {
+                    list.color_group.as_ref().map(|group| (group, *offset, &list.cull.draw_args))
+                });
+                let times = timer.as_mut().map(|timer| timer.render("field_colors"));
+                stage.record(encoder, times, sheet, (clear, &tile_lists.composited), draws);
+            }
 
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.classify", timer, "classify"));
             self.classify.record(&mut pass, &frame.classify_groups, any_offset, &tile_lists.composited);
@@ -239,7 +312,8 @@ impl FieldRasterizer {
 impl FieldFrame {
     /// The number of the frame's passes.
     pub(crate) fn passes(&self) -> usize {
-        SheetGroups::passes(&self.groups.planned.plan)
+        let colored = self.channels.iter().filter(|channel| channel.colors.is_some()).count();
+        SheetGroups::passes(&self.groups.planned.plan, self.channels.len() + colored)
     }
 
     /// The slabs that are classified with each plane.
@@ -251,9 +325,9 @@ impl FieldFrame {
         slabs
     }
 
-    /// Copies the frame's counts to the start of `staging`.
-    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
-        self.groups.copy_counts(encoder, staging);
+    /// Copies the frame's counts to a place in `staging`.
+    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer, at: u64) {
+        self.groups.copy_counts(encoder, staging, at);
     }
 
     /// The buffer with the words of first hits, and their byte offset in it.
@@ -270,7 +344,8 @@ impl FieldFrame {
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
-        self.groups.gpu_bytes() + lists + self.carried.iter().chain([&self.planes]).map(Buffer::size).sum::<u64>()
+        let planes = self.channels.iter().map(|channel| &channel.planes);
+        self.groups.gpu_bytes() + lists + self.carried.iter().chain(planes).map(Buffer::size).sum::<u64>()
     }
 }
 
@@ -280,9 +355,15 @@ fn drawn(request: &FrameRequest) -> Range<i32> {
     start..if start < end { end + 1 } else { end }
 }
 
-/// The buffer for what pixels carry from plane to plane.
-fn carried(pixels: u64) -> BufferSpec {
-    buffer_spec("sheetsplat.carried", pixels * CARRIED_BYTES, BufferUsages::STORAGE | BufferUsages::COPY_SRC)
+/// The layers of sheets that hold a plane's sums.
+fn layers(request: &FrameRequest) -> u32 {
+    request.stored.len() as u32 * field::SHEETS_PER_PLANE + request.colored()
+}
+
+/// The buffer for what the pixels of some rows carry from plane to plane.
+fn carried(request: &FrameRequest, rows: u32) -> BufferSpec {
+    let records = u64::from(request.view.size[0]) * u64::from(rows) * u64::from(request.records());
+    buffer_spec("sheetsplat.carried", records * CARRIED_BYTES, BufferUsages::STORAGE | BufferUsages::COPY_SRC)
 }
 
 /// The sheet depths of the planes that any brick's kernels reach, and one more before and behind: where one of a slab's planes has no value, the other stands

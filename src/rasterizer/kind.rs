@@ -5,12 +5,16 @@ use wgpu::Device;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::gpu::device::TILE_FEATURES;
+use crate::gpu::ramps::Stored;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::WORKGROUP_BYTES;
 use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
 /// The subgroup sizes that tiles support.
 const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=64;
+
+/// Whether tiles are compiled in: browsers have no barriers for subgroups, and a page's code must be short.
+pub(crate) const HAS_TILES: bool = cfg!(not(target_arch = "wasm32"));
 
 /// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,14 +28,15 @@ pub(crate) enum RasterizerKind {
 }
 
 impl RasterizerKind {
-    /// The rasterizer for some settings; if it is quads only because of the device, also the reason. `preferred` is the renderer's choice,
-    /// for settings that do not name one.
+    /// The rasterizer for some settings and the channels that share sheets; if it is quads only because of the device, also the reason. `preferred` is the
+    /// renderer's choice, for settings that do not name one.
     ///
     /// # Errors
     /// If the settings require what the device or the other settings do not allow.
     pub(crate) fn of(
         device: &Device,
         splatting: &Splatting,
+        channels: &[Stored],
         preferred: Rasterizer,
     ) -> Result<(Self, Option<RenderError>), RenderError> {
         let needs_tiles =
@@ -41,7 +46,7 @@ impl RasterizerKind {
             choice => choice,
         };
         let insisted = needs_tiles || choice == Rasterizer::Tiles;
-        let by_settings = obstacle_in_settings(splatting);
+        let by_settings = obstacle_in_settings(splatting, channels);
         let is_by_settings = by_settings.is_some();
         match (choice, by_settings.or_else(|| obstacle_in_device(device))) {
             (Rasterizer::Quads, _) if needs_tiles => {
@@ -65,9 +70,18 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
     Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
-/// Why tiles do not support some settings; `None` if they do.
-fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
-    if splatting.classification == Classification::After && splatting.compositing.is_by_means() {
+/// Why tiles do not support some settings, or channels with them; `None` if they do.
+fn obstacle_in_settings(splatting: &Splatting, channels: &[Stored]) -> Option<RenderError> {
+    let is_after = splatting.classification == Classification::After;
+    if is_after && channels.len() > 1 {
+        let found = format!("splatting.classification = \"after\" and {} channels", channels.len());
+        return refused_tiles(found, "\"before\" with them, or \"quads\"");
+    }
+    if is_after && channels.iter().any(|channel| channel.colors > 0) {
+        let found = "splatting.classification = \"after\" and a volume of colours".to_owned();
+        return refused_tiles(found, "\"before\" with it, or \"quads\"");
+    }
+    if is_after && splatting.compositing.is_by_means() {
         let found = "splatting.classification = \"after\" and a projection or \"surface\"".to_owned();
         return refused_tiles(found, "another splatting.compositing, \"before\" with it, or \"quads\"");
     }
@@ -83,7 +97,7 @@ fn obstacle_in_settings(splatting: &Splatting) -> Option<RenderError> {
 
 /// Why a device does not support tiles; `None` if it does.
 fn obstacle_in_device(device: &Device) -> Option<RenderError> {
-    if !device.features().contains(TILE_FEATURES) {
+    if !HAS_TILES || !device.features().contains(TILE_FEATURES) {
         return refused_tiles("a device without subgroups, or barriers for them".to_owned(), "\"quads\"");
     }
     let info = device.adapter_info();
@@ -99,25 +113,15 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
     None
 }
 
-/// Checks that the settings support cuts and first hits.
+/// Checks that first hits, if there are any, fit one binding.
 ///
 /// # Errors
-/// If they do not, or first hits exceed a binding.
-pub(crate) fn check_rays(
-    device: &Device,
-    splatting: &Splatting,
-    rays: RayMode,
-    first_hit: Option<f64>,
-    [width, height]: [u32; 2],
-) -> Result<(), RenderError> {
-    splatting.check_rays(rays.cut, first_hit)?;
-    if first_hit.is_none() {
-        return Ok(());
-    }
+/// If they do not.
+pub(crate) fn check_hits(device: &Device, rays: RayMode, [width, height]: [u32; 2]) -> Result<(), RenderError> {
     let limits = device.limits();
     let actual = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
     let required = 4 * u64::from(width) * u64::from(height);
-    if required > actual {
+    if rays.first_hit && required > actual {
         let (what, limit) = ("the image's first hits", "max_storage_buffer_binding_size");
         return Err(RenderError::Limit { what, limit, required, actual });
     }

@@ -9,15 +9,18 @@ pub(crate) mod samples;
 mod sheet_groups;
 pub(crate) mod tiles;
 
-use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue};
+use wgpu::{Buffer, BufferUsages, ComputePassDescriptor, Device, Queue, TextureView};
 
 use crate::error::RenderError;
 use crate::geometry::footprint::FootprintTable;
 use crate::gpu::bindings::filled;
+use crate::gpu::brick_lists::BrickLists;
 use crate::gpu::classified_volume::ClassifiedVolume;
 use crate::gpu::footprint_texture::FootprintTexture;
+use crate::gpu::layout::Brick;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
+use crate::gpu::volume_texture::OwnColors;
 use crate::kernel::Kernel;
 use crate::pass::composite::CutBuffers;
 use crate::rasterizer::request::FrameRequest;
@@ -58,7 +61,32 @@ pub(crate) struct FrameEstimate {
     pub(crate) passes: usize,
 }
 
-impl FrameInputs<'_> {
+impl<'a> FrameInputs<'a> {
+    /// The lists of the channels that are drawn.
+    fn lists(&self) -> &'a [BrickLists] {
+        &self.volume.lists[self.request.layer.lists.clone()]
+    }
+
+    /// The only one of these lists, where one splat draws a voxel in all channels.
+    fn list(&self) -> &'a BrickLists {
+        &self.volume.lists[self.request.layer.lists.start]
+    }
+
+    /// The bricks of every buffer of these lists.
+    fn bricks(&self) -> impl Iterator<Item = &'a [Brick]> {
+        self.lists().iter().flat_map(BrickLists::bricks)
+    }
+
+    /// The colours of voxels' own, if a channel that is drawn has any.
+    fn colors(&self) -> Option<OwnColors<'a>> {
+        self.volume.colors(&self.request.layer)
+    }
+
+    /// The labels, if shading needs them.
+    fn labels(&self) -> Option<&'a TextureView> {
+        self.volume.labels(&self.request.layer)
+    }
+
     /// As [`filled`](bindings::filled).
     fn filled(
         &self,

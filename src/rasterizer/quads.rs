@@ -113,10 +113,10 @@ impl QuadRasterizer {
         footprints: &Footprints,
         old: Vec<PreparedList>,
     ) -> Result<Vec<PreparedList>, RenderError> {
-        let FrameInputs { device, volume, frame, .. } = inputs;
+        let FrameInputs { device, frame, .. } = inputs;
         let buffers = groups.cull_buffers(inputs, None);
         let mut old = old.into_iter().map(|old| old.cull);
-        (volume.lists.lists.iter().zip(&groups.planned.orders).zip(&groups.planned.most))
+        (inputs.list().lists.iter().zip(&groups.planned.orders).zip(&groups.planned.most))
             .map(|((list, order), &most)| {
                 let cull = self.cull.prepare(device, buffers, list, order, most, old.next())?;
                 let splat_group = self.splat.bind(device, frame, &groups.groups, &cull, &footprints.texture);
@@ -152,7 +152,7 @@ impl QuadRasterizer {
         Ok(FrameEstimate {
             bytes: sizes(limits, &buffers)? + targets + FootprintTable::bytes(splatting.footprint),
             groups: plan.groups.len(),
-            passes: SheetGroups::passes(&plan),
+            passes: SheetGroups::passes(&plan, 1),
         })
     }
 
@@ -184,7 +184,7 @@ impl QuadRasterizer {
 impl QuadFrame {
     /// The number of the frame's passes.
     pub(crate) fn passes(&self) -> usize {
-        SheetGroups::passes(&self.groups.planned.plan)
+        SheetGroups::passes(&self.groups.planned.plan, 1)
     }
 
     /// The groups' slabs.
@@ -192,9 +192,9 @@ impl QuadFrame {
         self.groups.slabs()
     }
 
-    /// Copies the frame's counts to the start of `staging`.
-    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
-        self.groups.copy_counts(encoder, staging);
+    /// Copies the frame's counts to a place in `staging`.
+    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer, at: u64) {
+        self.groups.copy_counts(encoder, staging, at);
     }
 
     /// The buffer with the words of first hits, and their byte offset in it.

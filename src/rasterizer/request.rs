@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use wgpu::Device;
 
-use super::kind::{RasterizerKind, check_rays};
+use super::kind::{RasterizerKind, check_hits};
 use crate::after::brick_ranges::Bearing;
 use crate::after::normalization::Normalization;
 use crate::error::RenderError;
@@ -12,10 +12,14 @@ use crate::geometry::means;
 use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::surfaces::{SurfaceDepths, Surfaces};
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::gpu::classified_volume::{BrickNeeds, ClassifiedVolume};
-use crate::gpu::layout::Band;
+use crate::gpu::classified_volume::{ClassifiedVolume, Layer};
+use crate::gpu::layout::{Band, FieldPlanes};
+use crate::gpu::ramps::{Integration, Ramps, Stored};
+use crate::gpu::shown_bricks::BrickNeeds;
 use crate::gpu::targets::CompositingBuffer;
-use crate::gpu::uniforms::Ramps;
+use crate::gpu::uniforms;
+use crate::gpu::volume_texture::ValueFormat;
+use crate::image::channels::Joining;
 use crate::kernel::Kernel;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
@@ -24,9 +28,13 @@ use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Classification, Interpolation, Rasterizer, Splatting};
 use crate::settings::window::Window;
 
-/// A frame of a view.
+/// A frame of a view, in the channels that share sheets (SPEC §10).
 #[derive(Debug)]
 pub(crate) struct FrameRequest {
+    /// The channels.
+    pub(crate) layer: Layer,
+    /// Where their labels and colours are.
+    pub(crate) stored: Vec<Stored>,
     pub(crate) splatting: Splatting,
     pub(crate) view: ViewGeometry,
     pub(crate) kernel: Kernel,
@@ -57,20 +65,28 @@ pub(crate) struct After {
     /// The view, with the plane that the slab of its near plane begins at for a near plane.
     pub(crate) view: ViewGeometry,
     pub(crate) planes: PlaneGeometry,
-    pub(crate) numbers: Normalization,
+    /// What the values of each of the request's channels are splatted as.
+    pub(crate) numbers: Vec<Normalization>,
     pub(crate) needs: BrickNeeds,
     pub(crate) gradient: Gradient,
 }
 
 impl After {
-    fn new(volume: &ClassifiedVolume, scene: &Scene, seen: &ViewGeometry) -> Result<Self, RenderError> {
+    fn new(
+        (volume, layer): (&ClassifiedVolume, &Layer),
+        scene: &Scene,
+        seen: &ViewGeometry,
+    ) -> Result<Self, RenderError> {
         let splatting = &scene.splatting;
         let planes = PlaneGeometry::new(seen, volume.grid());
         let coefficients = match splatting.interpolation {
             Interpolation::Smooth => None,
             Interpolation::Exact => Some(volume.gpu_volume().coefficients((splatting.radius, splatting.falloff))?),
         };
-        let numbers = coefficients.as_ref().map_or_else(|| volume.gpu_volume().numbers(), |exact| exact.numbers);
+        let of_values = || volume.gpu_volume().numbers().to_vec();
+        let numbers =
+            coefficients.as_ref().map_or_else(of_values, |exact| exact.iter().map(|exact| exact.numbers).collect());
+        let numbers = numbers[layer.channels.clone()].to_vec();
         let mut view = *seen;
         if let Some(perspective) = &mut view.perspective {
             // There is no plane at the eye.
@@ -84,13 +100,14 @@ impl After {
 }
 
 impl FrameRequest {
-    /// Makes the request. The camera is the scene's with all values that depend on an object filled in.
+    /// Makes the request for one of a volume's layers, whose images are joined if there are several. The camera is the scene's with all values that depend
+    /// on an object filled in.
     ///
     /// # Errors
     /// If the scene needs something that is not implemented or that exceeds the device's limits.
     pub(crate) fn new(
         device: &Device,
-        volume: &ClassifiedVolume,
+        (volume, layer, joining): (&ClassifiedVolume, &Layer, Option<Joining>),
         (scene, camera): (&Scene, &Camera),
         (surfaces, first_hit, window): (Option<&Surfaces>, Option<f64>, Option<&Window>),
         rasterizer: Rasterizer,
@@ -99,23 +116,36 @@ impl FrameRequest {
         splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
-        let bands = CompositingBuffer::bands(&device.limits(), size)?;
+        let stored = volume.stored(layer);
+        let is_after = splatting.classification == Classification::After;
+        let records = if is_after { records(&volume.gpu_volume().stored()) } else { 1 };
+        let bands = CompositingBuffer::bands_for(&device.limits(), size, records)?;
         let is_cut = surfaces.is_some() || !scene.clip.is_empty() || window.is_some();
         let rays = RayMode { cut: is_cut, first_hit: first_hit.is_some() };
         let drawn = window.map_or_else(|| Window::whole(size), |window| window.opened(&seen.slabs_of(grid)));
-        check_rays(device, &splatting, rays, first_hit, size)?;
+        splatting.check_rays(rays.cut, first_hit)?;
+        // The nearest surface is the one with the nearest first hit, for any opacity.
+        let first_hit = first_hit.or((joining == Some(Joining::Nearest)).then_some(1.0));
+        let rays = RayMode { first_hit: first_hit.is_some(), ..rays };
+        check_hits(device, rays, size)?;
         let surfaces = match surfaces {
             Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
             None => None,
         };
-        let (kind, fallback) = RasterizerKind::of(device, &splatting, rasterizer)?;
-        let is_after = splatting.classification == Classification::After;
-        let after = is_after.then(|| After::new(volume, scene, &seen)).transpose()?;
-        let ramps = match &after {
-            None => Ramps::new(volume.transfer()),
-            Some(after) => Ramps::with_integrals(volume.transfer(), splatting.compositing, &after.numbers),
-        };
+        let (kind, fallback) = RasterizerKind::of(device, &splatting, &stored, rasterizer)?;
+        let after = is_after.then(|| After::new((volume, layer), scene, &seen)).transpose()?;
+        let integration = after.as_ref().map(|after| Integration {
+            compositing: splatting.compositing,
+            numbers: &after.numbers,
+            radius: splatting.radius,
+        });
+        let first_channel = layer.channels.start;
+        let alone = (first_channel > 0).then(|| volume.transfer().of_channel(first_channel));
+        let transfer = alone.as_ref().unwrap_or_else(|| volume.transfer());
+        let ramps = Ramps::of_channels(transfer, &stored, first_channel as u32, integration);
         Ok(Self {
+            layer: layer.clone(),
+            stored,
             after,
             kind,
             fallback,
@@ -138,6 +168,23 @@ impl FrameRequest {
         self.after.as_ref().map_or(&self.view, |after| &after.view)
     }
 
+    /// What one of the request's channels is drawn onto slab planes by, given by its number among them, in a volume whose values are stored in a
+    /// format.
+    pub(crate) fn planes(&self, after: &After, channel: usize, format: ValueFormat) -> FieldPlanes {
+        let planes = uniforms::planes(&after.planes, self.stage_view(), format, &after.numbers[channel]);
+        FieldPlanes { channel: channel as u32, colors: self.stored[channel].colors, ..planes }
+    }
+
+    /// The number of the request's channels with colours of voxels' own.
+    pub(crate) fn colored(&self) -> u32 {
+        colored(&self.stored)
+    }
+
+    /// The records that every pixel carries from plane to plane.
+    pub(crate) fn records(&self) -> u32 {
+        records(&self.stored)
+    }
+
     /// The number of pixels in the image.
     pub(crate) fn pixels(&self) -> u64 {
         self.view.size.map(u64::from).iter().product()
@@ -147,4 +194,14 @@ impl FrameRequest {
     pub(crate) fn hit_bytes(&self) -> u64 {
         if self.rays.first_hit { 4 * self.pixels() } else { 0 }
     }
+}
+
+/// The number of channels with colours of voxels' own.
+fn colored(stored: &[Stored]) -> u32 {
+    stored.iter().filter(|stored| stored.colors > 0).count() as u32
+}
+
+/// The records that every pixel carries from plane to plane: one for each channel, and one for each with colours.
+fn records(stored: &[Stored]) -> u32 {
+    stored.len() as u32 + colored(stored)
 }

@@ -2,7 +2,6 @@
 //! colours of hidden voxels bleed, as the paper says.
 
 use glam::{DVec2, UVec3};
-use rayon::prelude::*;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
 use super::{Footprints, FrameEstimate, FrameInputs, Prepared, compute};
@@ -17,6 +16,7 @@ use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::lists::brick::{self, BRICK_VOXELS};
 use crate::lists::quad_plan::tile_grid;
+use crate::parallel::prelude::*;
 use crate::pass::composite::{Composite, CompositeBuffers, CompositeMode, RayMode};
 use crate::pass::sample::{Sample, SampleBuffers, SampleMode};
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
@@ -91,7 +91,7 @@ impl SampleRasterizer {
     ) -> Result<(SampleFrame, Prepared), RenderError> {
         let FrameInputs { device, volume, request, .. } = inputs;
         let FrameRequest { view, kernel, splatting, .. } = request;
-        let bricks = volume.lists.all();
+        let bricks = inputs.list().all();
         let splat_bytes = splat_bytes(&device.limits(), bricks.len())?;
         let (old_sorted, old_footprints) = match previous {
             Some(old) => (Some(old.sorted), Some(old.footprints)),
@@ -111,12 +111,12 @@ impl SampleRasterizer {
             device,
             ShadeBuffers {
                 frame: inputs.frame,
-                bricks: volume.lists.lists.first().map_or(&buffers.splats, |list| &list.buffer),
+                bricks: inputs.list().lists.first().map_or(&buffers.splats, |list| &list.buffer),
                 values: volume.values(),
                 has_holes: volume.has_holes(),
                 channels: request.ramps.channels,
-                colors: volume.colors(),
-                labels: volume.labels(),
+                colors: inputs.colors(),
+                labels: inputs.labels(),
                 control_points: inputs.control_points,
                 places: &buffers.order,
                 args: &buffers.args,
@@ -202,10 +202,10 @@ impl SampleFrame {
         GroupSlabs { firsts: Vec::new(), sheets: 1 }
     }
 
-    /// Copies the frame's counts to the start of `staging`.
-    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
+    /// Copies the frame's counts to a place in `staging`.
+    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer, at: u64) {
         let counts = &self.buffers.counts;
-        encoder.copy_buffer_to_buffer(counts, 0, staging, 0, counts.size());
+        encoder.copy_buffer_to_buffer(counts, 0, staging, at, counts.size());
     }
 
     /// Bytes of GPU memory.

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits, TextureFormat, TextureView};
 
 use super::FrameInputs;
 use crate::error::RenderError;
@@ -92,7 +92,7 @@ impl SheetGroups {
             }
         };
         let [old_groups, old_culled, old_hits] = old_buffers;
-        let targets = match old_targets.filter(|old| old.size == view.size) {
+        let targets = match old_targets.filter(|old| old.size == view.size && old.layers() == layers) {
             Some(targets) => targets,
             None => Targets::new(device, view.size, format, layers)?,
         };
@@ -133,14 +133,15 @@ impl SheetGroups {
         planes: Option<PlaneBuffers<'a>>,
     ) -> CullBuffers<'a> {
         let FrameInputs { volume, frame, control_points, request, .. } = inputs;
+        let (colors, labels) = (inputs.colors(), inputs.labels());
         CullBuffers {
             frame,
             groups: &self.groups,
             values: volume.values(),
             has_holes: volume.has_holes(),
             channels: request.ramps.channels,
-            colors: volume.colors(),
-            labels: volume.labels(),
+            colors,
+            labels,
             control_points,
             occluded: &self.targets.occluded,
             culled: &self.culled,
@@ -179,9 +180,9 @@ impl SheetGroups {
         })
     }
 
-    /// The number of timed passes: three per group.
-    pub(super) fn passes(plan: &FramePlan) -> usize {
-        3 * plan.groups.len()
+    /// The number of timed passes: for each group one of culling, one of compositing, and those that draw quads between them.
+    pub(super) fn passes(plan: &FramePlan, draws: usize) -> usize {
+        (2 + draws) * plan.groups.len()
     }
 
     /// The groups' slabs, or planes.
@@ -190,11 +191,11 @@ impl SheetGroups {
         GroupSlabs { firsts: groups.iter().map(|group| group.first_slab).collect(), sheets: *sheets }
     }
 
-    /// Copies the frame's counts to the start of `staging`.
-    pub(super) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
+    /// Copies the frame's counts to a place in `staging`.
+    pub(super) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer, at: u64) {
         let (tally, tiles) = (size_of::<Tally>() as u64, self.planned.plan.groups.len() as u64 * 4);
-        encoder.copy_buffer_to_buffer(&self.culled, 0, staging, 0, tally);
-        encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, tally, tiles);
+        encoder.copy_buffer_to_buffer(&self.culled, 0, staging, at, tally);
+        encoder.copy_buffer_to_buffer(&self.tile_lists.counts, 0, staging, at + tally, tiles);
     }
 
     /// Bytes of GPU memory.
@@ -210,7 +211,7 @@ impl Planned {
     /// The plan for a view in which these sheet depths count, taken from `old` if one is still valid there; the plans that stay valid for
     /// other axes; and whether the plan is new.
     fn renewed(inputs: FrameInputs<'_>, settings: GroupSettings<'_>, old: Vec<Self>) -> (Self, Vec<Self>, bool) {
-        let FrameInputs { device, volume, request, .. } = inputs;
+        let FrameInputs { volume, request, .. } = inputs;
         let GroupSettings { view, .. } = settings;
         let order = request.splatting.order;
         let mut usable = old;
@@ -220,26 +221,25 @@ impl Planned {
         let current = usable.iter().position(|old| old.plan.view.has_depths_of(view));
         let mut planned = match current {
             Some(at) => usable.swap_remove(at),
-            None => Self::new(device, volume, order, settings),
+            None => Self::new(inputs, order, settings),
         };
         planned.plan.view = *view;
         (planned, usable, current.is_none())
     }
 
     fn new(
-        device: &Device,
-        volume: &ClassifiedVolume,
+        inputs: FrameInputs<'_>,
         order: Order,
         GroupSettings { view, covered, drawn, sheets, .. }: GroupSettings<'_>,
     ) -> Self {
-        let plan = FramePlan::new(volume.lists.bricks(), *view, sheets, order, covered.clone(), drawn);
-        let most = most_of(volume.lists.bricks(), &plan);
+        let plan = FramePlan::new(inputs.bricks(), *view, sheets, order, covered.clone(), drawn);
+        let (most, revision) = (most_of(inputs.bricks(), &plan), inputs.volume.revision);
         let upload = |order: &Vec<u32>| {
             let bytes = order_bytes(order);
-            uploaded(device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
+            uploaded(inputs.device, "sheetsplat.order", bytes, bytes.len() as u64, BufferUsages::STORAGE)
         };
         let orders = plan.orders.iter().map(upload).collect();
-        Self { order, covered: covered.clone(), drawn: drawn.clone(), revision: volume.revision, orders, most, plan }
+        Self { order, covered: covered.clone(), drawn: drawn.clone(), revision, orders, most, plan }
     }
 
     /// Whether another frame of a volume can go by it.

@@ -64,18 +64,18 @@ impl TileRasterizer {
         inputs: FrameInputs<'_>,
         previous: Option<TileFrame>,
     ) -> Result<(TileFrame, Prepared), RenderError> {
-        let FrameInputs { device, queue, volume, request, .. } = inputs;
+        let FrameInputs { device, queue, request, .. } = inputs;
         let limits = device.limits();
         let (old_binned, old_buffers) = previous.map(|old| (old.binned, old.buffers)).unzip();
-        let bricks = volume.lists.all();
+        let bricks = inputs.list().all();
         let (binned, is_new) = Binned::renewed(&limits, inputs, bricks, old_binned)?;
         let results = GatheredLayout::new(&request.view, &binned.bins, bricks.len() as u32);
-        let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), volume.lists.lists.len())?;
+        let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), inputs.list().lists.len())?;
         let (range_bytes, dispatches) = patch_ranges(&limits, request);
         let contents = (&binned.bins, &results, &range_bytes[..]);
         let buffers = TileBuffers::filled(inputs, spec, contents, bricks, (old_buffers, is_new))?;
         let coefficients = match request.after.as_ref().and_then(|after| after.needs.coefficients.as_ref()) {
-            Some(exact) => Some(exact.texture(device, queue)?),
+            Some(exact) => Some(exact[request.layer.channels.start].texture(device, queue)?),
             None => None,
         };
         let bands = self.bind(inputs, &binned.bins, &buffers, coefficients);
@@ -92,22 +92,22 @@ impl TileRasterizer {
     ) -> Vec<GatherBand> {
         let FrameInputs { device, volume, request, .. } = inputs;
         let FrameRequest { splatting, view, rays, .. } = request;
-        let of_volume = [volume.labels().is_some(), volume.has_holes()];
+        let of_volume = [inputs.labels().is_some(), volume.has_holes()];
         let planes = plane_mode(request);
         let mode = GatherMode::of(splatting, planes, view.perspective.is_some(), of_volume, *rays, bins.workgroups)
-            .with_channels(request.ramps.channels, volume.colors());
+            .with_channels(request.ramps.channels, inputs.colors());
         let buffers = GatherBuffers {
             frame: inputs.frame,
             gather: &own.uniform,
             planes: own.planes.as_ref().map(|planes| PlaneBuffers { planes, coefficients }),
             patch_ranges: &own.patch_ranges,
-            bricks: own.bricks.as_ref().unwrap_or_else(|| &volume.lists.lists[0].buffer),
+            bricks: own.bricks.as_ref().unwrap_or_else(|| &inputs.list().lists[0].buffer),
             starts: &own.starts,
             entries: &own.entries,
             control_points: inputs.control_points,
             values: volume.values(),
-            colors: volume.colors(),
-            labels: volume.labels(),
+            colors: inputs.colors(),
+            labels: inputs.labels(),
             gathered: &own.gathered,
             half_boxes: &own.half_boxes,
             cut: inputs.cut,
@@ -160,9 +160,9 @@ impl TileFrame {
         GroupSlabs { firsts, sheets: SHEETS }
     }
 
-    /// Copies the frame's counts to the start of `staging`.
-    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
-        encoder.copy_buffer_to_buffer(&self.buffers.gathered, 0, staging, 0, self.results.count_bytes());
+    /// Copies the frame's counts to a place in `staging`.
+    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer, at: u64) {
+        encoder.copy_buffer_to_buffer(&self.buffers.gathered, 0, staging, at, self.results.count_bytes());
     }
 
     /// The buffer with the words of first hits, and their byte offset in it.
@@ -187,7 +187,7 @@ impl Binned {
     ) -> Result<(Self, bool), RenderError> {
         let FrameInputs { volume, request, .. } = inputs;
         let FrameRequest { splatting, view, kernel, covered, .. } = request;
-        let search = all_search_passes(request, volume.labels().is_some());
+        let search = all_search_passes(request, inputs.labels().is_some());
         let (order, planes) = (drawn_order(splatting), request.after.as_ref().map(|after| after.planes));
         let is_current = |old: &Self| {
             old.view == *view
@@ -269,9 +269,8 @@ impl TileBuffers<Buffer> {
             gathered: grown(device, old.gathered, &spec.gathered)?,
             uniform: write(old.uniform, &spec.uniform, bytemuck::bytes_of(&uniform))?,
             planes: match (spec.planes, &request.after) {
-                (Some(spec), Some(After { planes, numbers, .. })) => {
-                    let format = inputs.volume.gpu_volume().value_format();
-                    let planes = uniforms::planes(planes, &request.view, format, numbers);
+                (Some(spec), Some(after)) => {
+                    let planes = request.planes(after, 0, inputs.volume.gpu_volume().value_format());
                     Some(write(old.planes, &spec, bytemuck::bytes_of(&planes))?)
                 }
                 _ => None,

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 
 use glam::DVec4;
-use rayon::prelude::*;
 
 use super::first_hit::FirstHits;
 use super::visibility::{OpaqueMask, Test};
@@ -14,6 +13,7 @@ use super::{composite, resolve, shading, sheets, splat};
 use crate::error::RenderError;
 use crate::kernel::Kernel;
 use crate::lists::quad_plan::tile_grid;
+use crate::parallel::prelude::*;
 use crate::part::Content;
 use crate::scene::Scene;
 use crate::settings::splatting::{Compositing, Method, Order};

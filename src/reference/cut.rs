@@ -4,9 +4,9 @@
 use std::ops::Range;
 
 use glam::{DVec3, UVec2};
-use rayon::prelude::*;
 
 use super::{Buffer, Geometry};
+use crate::parallel::prelude::*;
 use crate::settings::clip::HalfSpace;
 use crate::settings::splatting::Method;
 

@@ -3,10 +3,10 @@
 use std::ops::{Range, RangeInclusive};
 
 use glam::{DVec3, UVec2};
-use rayon::prelude::*;
 
 use super::cut::{self, PixelRay};
 use super::{Buffer, Geometry};
+use crate::parallel::prelude::*;
 use crate::settings::clip::HalfSpace;
 use crate::settings::splatting::Compositing;
 

@@ -7,13 +7,13 @@
 //! Rays have no width, so there is no low-pass rule: comparisons are valid where a grid unit covers at least a pixel.
 
 use glam::{DVec3, DVec4, IVec3, UVec2, UVec3};
-use rayon::prelude::*;
 
 use super::composite::composite_pixel;
 use super::{Buffer, Geometry, cut, resolve, shading};
 use crate::error::RenderError;
 use crate::image::Image;
 use crate::kernel::Kernel;
+use crate::parallel::prelude::*;
 use crate::scene::Scene;
 use crate::settings::splatting::{Compositing, Order};
 use crate::settings::transfer_function::TransferFunction;

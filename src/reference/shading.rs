@@ -1,11 +1,11 @@
 //! Classification and shading (SPEC §3): the f64 evaluation of `shaders/shade.wgsl`.
 
 use glam::{DVec2, DVec3, DVec4};
-use rayon::prelude::*;
 
 use super::Geometry;
 use crate::error::setting::scaled;
 use crate::lists::classify::channels;
+use crate::parallel::prelude::*;
 use crate::scene::Scene;
 use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::Compositing;

@@ -1,11 +1,11 @@
 //! Sheet buffers (SPEC §5): the f64 evaluation of `shaders/splat.wgsl`.
 
 use glam::{DVec2, DVec4};
-use rayon::prelude::*;
 
 use super::footprint::Footprint;
 use super::{Buffer, Geometry, Splat};
 use crate::kernel::Kernel;
+use crate::parallel::prelude::*;
 
 /// A kernel section, or a whole kernel, on the screen.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,37 +2,39 @@
 //! records it, and presents it, which fails only for a scissor outside the target.
 
 pub(crate) mod pick;
+mod prepare;
 pub(crate) mod prepared_frame;
 pub(crate) mod scene_view;
 
 use std::sync::{Once, OnceLock};
 
-use wgpu::{Buffer, BufferUsages, CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
+use wgpu::{CommandEncoder, Device, Queue, RenderPass, TextureFormat, TextureView};
 
 use crate::error::setting::SettingError;
 use crate::error::{RenderError, check_device};
-use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
-use crate::gpu::classified_volume::BrickNeeds;
-use crate::gpu::counts::Staging;
+use crate::gpu::bindings::sizes;
+use crate::gpu::brick_lists::SettledBricks;
+use crate::gpu::counts;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
-use crate::gpu::layout::{Cut, Frame, Tally};
+use crate::gpu::layout::Brick;
 use crate::gpu::options::RendererOptions;
 use crate::gpu::placement::Placement;
-use crate::gpu::targets::{CompositingBuffer, no_surfaces};
-use crate::gpu::timer::{PASS_BYTES, Timer};
-use crate::gpu::uniforms;
-use crate::pass::composite::CutBuffers;
+use crate::gpu::targets::CompositingBuffer;
+use crate::gpu::timer::Timer;
 use crate::pass::first_hit::FirstHit;
+use crate::pass::join::Join;
 use crate::pass::resolve::Resolve;
-use crate::rasterizer::FrameInputs;
+use crate::rasterizer::compute;
 use crate::rasterizer::fields::FieldRasterizer;
-use crate::rasterizer::kind::RasterizerKind;
+use crate::rasterizer::kind::{HAS_TILES, RasterizerKind};
 use crate::rasterizer::quads::QuadRasterizer;
-use crate::rasterizer::request::FrameRequest;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
-use crate::renderer::prepared_frame::{Drawing, FirstHits, PreparedFrame, PreviousFrame};
+use crate::renderer::prepare::{
+    control_points, cut_uniform, frame_uniform, joined_hits, needs_of, staging, timestamps_at,
+};
+use crate::renderer::prepared_frame::{Drawing, FirstHits, Joined, PreparedFrame, PreparedLayer};
 use crate::renderer::scene_view::{Prepared, SceneView};
 use crate::settings::splatting::Rasterizer;
 
@@ -51,6 +53,8 @@ pub struct Renderer {
     fields: OnceLock<FieldRasterizer>,
     samples: OnceLock<SampleRasterizer>,
     tiles: TileRasterizer,
+    /// For channels with images of their own.
+    join: Join,
     resolve: Resolve,
     first_hit: OnceLock<FirstHit>,
     /// A depth texture of one texel, bound where the host gives no surfaces.
@@ -83,6 +87,7 @@ impl Renderer {
             fields: OnceLock::new(),
             samples: OnceLock::new(),
             tiles: TileRasterizer::default(),
+            join: Join::default(),
             resolve,
             first_hit: OnceLock::new(),
             no_surfaces: OnceLock::new(),
@@ -109,7 +114,7 @@ impl Renderer {
         scoped(device, || self.prepare_unscoped(device, queue, view)).unwrap_or_else(|fault| {
             // Objects allocated without memory are invalid.
             view.frame = None;
-            view.volume.lists.forget();
+            view.volume.forget();
             Err(fault.into())
         })
     }
@@ -122,190 +127,59 @@ impl Renderer {
     /// If the scene needs something that is not implemented or that exceeds the device's limits.
     pub fn estimate(&self, view: &SceneView) -> Result<u64, RenderError> {
         check_device(view.volume.gpu_volume().device(), &self.device, "the renderer")?;
-        let request = self.request(view)?;
+        let (layers, joining) = view.volume.layers();
+        let requests = self.requests(view, &layers, joining)?;
         let limits = self.device.limits();
-        let settled = view.volume.settled_for(&limits, needs_of(&request));
-        let lists = settled.lists();
-        let by_label = view.volume.shades_by_label();
-        let tiles = match request.kind {
-            RasterizerKind::Tiles { insisted } => {
-                let bricks = (settled.all(), lists.len());
-                match TileRasterizer::estimate(&limits, &request, bricks, by_label) {
-                    Err(error) if insisted => return Err(error),
-                    needs => needs.ok(),
+        let (first, format) = (&requests[0], self.sheet_format);
+        let needs = needs_of(first);
+        let settled = view.volume.settled_for(&limits, needs);
+        let (mut drawn, mut count_bytes, mut passes) = (0, 0, 1);
+        let mut buffers = vec![cut_uniform()];
+        for request in &requests {
+            let settled = &settled[request.layer.lists.clone()];
+            let lists: Vec<&[Brick]> = settled.iter().flat_map(SettledBricks::lists).collect();
+            let all = settled[0].all();
+            let by_label = view.volume.shades_by_label(&request.layer);
+            let tiles = match request.kind {
+                RasterizerKind::Tiles { insisted } if HAS_TILES => {
+                    match TileRasterizer::estimate(&limits, request, (all, lists.len()), by_label) {
+                        Err(error) if insisted => return Err(error),
+                        needs => needs.ok(),
+                    }
                 }
-            }
-            RasterizerKind::Quads | RasterizerKind::Samples => None,
-        };
-        let needs = match (tiles, request.kind, &request.after) {
-            (Some(needs), ..) => needs,
-            (None, RasterizerKind::Samples, _) => {
-                let bricks = (view.volume.grid(), settled.all());
-                SampleRasterizer::estimate(&limits, &request, bricks, self.sheet_format)?
-            }
-            (None, _, Some(after)) => FieldRasterizer::estimate(&limits, &request, after, &lists, self.sheet_format)?,
-            (None, _, None) => QuadRasterizer::estimate(&limits, &request, &lists, (self.sheet_format, self.sheets))?,
-        };
-        let passes = needs.passes + 1;
+                _ => None,
+            };
+            let needs = match (tiles, request.kind, &request.after) {
+                (Some(needs), ..) => needs,
+                (None, RasterizerKind::Samples, _) => {
+                    SampleRasterizer::estimate(&limits, request, (view.volume.grid(), all), format)?
+                }
+                (None, _, Some(after)) => FieldRasterizer::estimate(&limits, request, after, &lists, format)?,
+                (None, _, None) => QuadRasterizer::estimate(&limits, request, &lists, (format, self.sheets))?,
+            };
+            drawn += needs.bytes;
+            count_bytes += counts::count_bytes(needs.groups);
+            passes += needs.passes + usize::from(joining.is_some());
+            buffers.extend([frame_uniform(), control_points(request)]);
+        }
         let timer = if self.profile { Timer::estimate(&self.device, passes) } else { None };
-        let buffers = [
-            frame_uniform(),
-            control_points(&request),
-            cut_uniform(),
-            staging(timestamps_at(needs.groups), timer.is_some(), passes),
-        ];
-        let coefficients = match needs_of(&request) {
-            Some(BrickNeeds { coefficients: Some(exact), .. }) => exact.estimate(&limits)?,
-            _ => 0,
-        };
-        let volume = view.volume.estimate()? + settled.gpu_bytes() + coefficients;
-        let compositing = CompositingBuffer::estimate(request.view.size, request.bands.len());
-        let counts = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
-        Ok(volume + compositing + needs.bytes + request.hit_bytes() + counts)
-    }
-
-    fn request(&self, view: &SceneView) -> Result<FrameRequest, RenderError> {
-        let SceneView { volume, scene, surfaces, first_hit, window, .. } = view;
-        FrameRequest::new(
-            &self.device,
-            volume,
-            (scene, &view.camera()),
-            (surfaces.as_ref(), *first_hit, window.as_ref()),
-            self.rasterizer,
-        )
-    }
-
-    fn prepare_unscoped(&self, device: &Device, queue: &Queue, view: &mut SceneView) -> Result<Prepared, RenderError> {
-        // Everything that can fail comes before anything is taken from the last frame.
-        let mut request = self.request(view)?;
-        let SceneView { volume, scene, surfaces, frame, .. } = view;
-        let fallback = request.fallback.take();
-        if let Some(after) = &request.after {
-            volume.show(&after.needs);
-        }
-        volume.flush(device, queue)?;
-        let sheets = (self.sheet_format, self.sheets);
-        let kept = PreviousFrame::of(frame.take(), sheets, &request.view);
-        let FrameRequest { view: seen, kernel, ramps, rays, .. } = &request;
-        let size = seen.size;
-        let grid = *volume.grid();
-        let compositing = kept.compositing.unwrap_or_else(|| CompositingBuffer::new(device, size, &request.bands));
-        let write = |old, spec: &BufferSpec, bytes: &[u8]| written(device, queue, old, spec, bytes);
-        let points = bytemuck::cast_slice(&ramps.points);
-        let control_points = write(kept.control_points, &control_points(&request), points)?;
-        let frame_values =
-            uniforms::frame(request.stage_view(), kernel, (&grid, volume.gpu_volume().value_format()), ramps, scene);
-        let uniform = write(kept.uniform, &frame_uniform(), bytemuck::bytes_of(&frame_values))?;
-        let cut_values = uniforms::cut(seen, &grid, scene, request.surfaces, request.first_hit, &request.window);
-        let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;
-        let cut_buffers = CutBuffers {
-            uniform: &cut,
-            surfaces: match surfaces {
-                Some(surfaces) => &surfaces.depth,
-                None => self.no_surfaces.get_or_init(|| no_surfaces(device)),
-            },
-        };
-
-        let inputs = FrameInputs {
-            device,
-            queue,
-            volume,
-            request: &request,
-            frame: &uniform,
-            control_points: &control_points,
-            compositing: &compositing,
-            cut: cut_buffers,
-        };
-        let was = kept.drawing.as_ref().map(Drawing::rasterizer);
-        let (drawing, prepared, too_much) = self.draw_with(inputs, kept.drawing)?;
-        let fallback = fallback.or(too_much);
-        if let Some(reason) = &fallback {
-            self.fell_back.call_once(|| {
-                log::warn!("drawn by quads, which may take longer than by tiles: {reason}");
-            });
-        }
-        let totals = kept.totals.filter(|_| !prepared.bucketed && was == Some(drawing.rasterizer()));
-
-        let first_hits = drawing.first_hits().filter(|_| rays.first_hit).map(|words| {
-            let stage = self.first_hit.get_or_init(|| FirstHit::new(device));
-            let texture = kept.first_hits.unwrap_or_else(|| FirstHit::texture(device, size));
-            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-            FirstHits { group: stage.bind(device, &uniform, cut_buffers, words), texture, view }
-        });
-
-        // The rasterizer's passes, plus resolve.
-        let passes = drawing.passes() + 1;
-        let timer = if self.profile { Timer::new(device, passes) } else { None };
-        let timestamps = timestamps_at(drawing.group_slabs().firsts.len());
-        let staging = grown(device, kept.staging, &staging(timestamps, timer.is_some(), passes))?;
-        let timer_bytes = timer.as_ref().map_or(0, Timer::gpu_bytes);
-        let buffers: u64 = [&uniform, &control_points, &cut, &staging].map(Buffer::size).iter().sum();
-        let shared_bytes = compositing.gpu_bytes() + buffers + request.hit_bytes() + timer_bytes;
-        *frame = Some(PreparedFrame {
-            gpu_bytes: volume.gpu_bytes() + drawing.gpu_bytes() + shared_bytes,
-            sheets,
-            resolve_groups: compositing.bands.iter().map(|band| self.resolve.bind(device, &uniform, band)).collect(),
-            view: *seen,
-            drawing,
-            fallback,
-            compositing,
-            uniform,
-            control_points,
-            cut,
-            first_hits,
-            timer,
-            totals,
-            staging: Some(Staging { buffer: staging, timestamps, stages: Vec::new(), period: self.period }),
-        });
-        Ok(prepared)
-    }
-
-    /// Prepares a rasterizer's part: tiles, or quads if the view does not fit tiles and the scene does not require them. The error then says
-    /// why.
-    fn draw_with(
-        &self,
-        inputs: FrameInputs<'_>,
-        previous: Option<Drawing>,
-    ) -> Result<(Drawing, Prepared, Option<RenderError>), RenderError> {
-        let (mut old_quads, mut old_tiles, mut old_samples, mut old_fields) = (None, None, None, None);
-        match previous {
-            Some(Drawing::Quads(frame)) => old_quads = Some(*frame),
-            Some(Drawing::Fields(frame)) => old_fields = Some(*frame),
-            Some(Drawing::Tiles(frame)) => old_tiles = Some(*frame),
-            Some(Drawing::Samples(frame)) => old_samples = Some(*frame),
-            None => {}
-        }
-        let kind = inputs.request.kind;
-        if kind == RasterizerKind::Samples {
-            let (frame, prepared) = self.samples(inputs.device).prepare(inputs, old_samples)?;
-            return Ok((Drawing::Samples(Box::new(frame)), prepared, None));
-        }
-        let mut fallback = None;
-        if let RasterizerKind::Tiles { insisted } = kind {
-            match self.tiles.prepare(inputs, old_tiles) {
-                Ok((frame, prepared)) => return Ok((Drawing::Tiles(Box::new(frame)), prepared, None)),
-                Err(error) if insisted => return Err(error),
-                Err(error) => fallback = Some(error),
+        buffers.push(staging(timestamps_at(count_bytes), timer.is_some(), passes));
+        let coefficients = match needs.and_then(|needs| needs.coefficients.as_ref()) {
+            Some(exact) => {
+                let drawn = requests.last().map_or(0, |last| last.layer.channels.end);
+                exact.iter().take(drawn).map(|exact| exact.estimate(&limits)).sum::<Result<u64, RenderError>>()?
             }
+            None => 0,
+        };
+        let lists: u64 = settled.iter().map(SettledBricks::gpu_bytes).sum();
+        let mut compositing = CompositingBuffer::estimate(first.view.size, first.bands.len());
+        if joining.is_some() {
+            compositing *= 2;
+            buffers.extend([frame_uniform(), joined_hits(first)]);
         }
-        if let Some(after) = &inputs.request.after {
-            let (frame, prepared) = self.fields(inputs.device).prepare(inputs, after, old_fields)?;
-            return Ok((Drawing::Fields(Box::new(frame)), prepared, fallback));
-        }
-        let (frame, prepared) = self.quads(inputs.device).prepare(inputs, old_quads)?;
-        Ok((Drawing::Quads(Box::new(frame)), prepared, fallback))
-    }
-
-    fn samples(&self, device: &Device) -> &SampleRasterizer {
-        self.samples.get_or_init(|| SampleRasterizer::new(device, self.sheet_format))
-    }
-
-    fn fields(&self, device: &Device) -> &FieldRasterizer {
-        self.fields.get_or_init(|| FieldRasterizer::new(device, self.sheet_format))
-    }
-
-    fn quads(&self, device: &Device) -> &QuadRasterizer {
-        self.quads.get_or_init(|| QuadRasterizer::new(device, self.sheet_format, self.sheets))
+        let hits = if view.first_hit.is_some() { first.hit_bytes() } else { 0 };
+        let buffers = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
+        Ok(view.volume.estimate()? + lists + coefficients + compositing + drawn + hits + buffers)
     }
 
     /// Records the drawing of the view's prepared frame into the view's own buffers, which [`Self::present`] and [`Self::draw`] read in this
@@ -313,13 +187,39 @@ impl Renderer {
     /// commands must be submitted before the view is prepared again.
     pub fn record(&self, encoder: &mut CommandEncoder, view: &mut SceneView) {
         let Some(frame) = &mut view.frame else { return };
-        let PreparedFrame { drawing, compositing, timer, .. } = frame;
+        let PreparedFrame { layers, compositing, joined, timer, .. } = frame;
         if let Some(timer) = timer {
             timer.restart();
         }
-        for band in &compositing.bands {
-            encoder.clear_buffer(&band.acc, 0, None);
+        if let Some(joined) = joined {
+            joined.compositing.clear(encoder);
+            encoder.clear_buffer(&joined.hits, 0, None);
         }
+        for (number, layer) in layers.iter().enumerate() {
+            compositing.clear(encoder);
+            self.record_layer(encoder, timer, &layer.drawing);
+            if let Some(Joined { mode, groups, .. }) = joined {
+                let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.join", timer, "join"));
+                let pixels = compositing.bands.iter().map(|band| compositing.size[0] * band.band.rows);
+                self.join.record(&mut pass, *mode, groups[number].iter().zip(pixels));
+            }
+        }
+        if let (Some(stage), Some(FirstHits { view, group, .. })) = (self.first_hit.get(), &frame.first_hits) {
+            stage.record(encoder, group, view);
+        }
+        if let Some(staging) = &mut frame.staging {
+            let mut at = 0;
+            for PreparedLayer { drawing, .. } in layers {
+                drawing.copy_counts(encoder, &staging.buffer, at);
+                at += counts::count_bytes(drawing.group_slabs().firsts.len());
+            }
+            if let Some(timer) = timer {
+                staging.stages = timer.copy(encoder, &staging.buffer, staging.timestamps);
+            }
+        }
+    }
+
+    fn record_layer(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, drawing: &Drawing) {
         match drawing {
             Drawing::Tiles(tiles) => self.tiles.record(encoder, timer, tiles),
             Drawing::Fields(fields) => {
@@ -336,15 +236,6 @@ impl Renderer {
                 if let Some(rasterizer) = self.quads.get() {
                     rasterizer.record(encoder, timer, quads);
                 }
-            }
-        }
-        if let (Some(stage), Some(FirstHits { view, group, .. })) = (self.first_hit.get(), &frame.first_hits) {
-            stage.record(encoder, group, view);
-        }
-        if let Some(staging) = &mut frame.staging {
-            drawing.copy_counts(encoder, &staging.buffer);
-            if let Some(timer) = timer {
-                staging.stages = timer.copy(encoder, &staging.buffer, staging.timestamps);
             }
         }
     }
@@ -401,33 +292,4 @@ impl Renderer {
         let bands = compositing.bands.iter().map(|band| band.band);
         self.resolve.draw(pass, compositing.size, resolve_groups.iter().zip(bands), at);
     }
-}
-
-/// What decides which bricks a frame draws whose values are classified after splatting.
-fn needs_of(request: &FrameRequest) -> Option<&BrickNeeds> {
-    request.after.as_ref().map(|after| &after.needs)
-}
-
-fn frame_uniform() -> BufferSpec {
-    content_spec("sheetsplat.frame", size_of::<Frame>() as u64, BufferUsages::UNIFORM)
-}
-
-fn cut_uniform() -> BufferSpec {
-    content_spec("sheetsplat.cut", size_of::<Cut>() as u64, BufferUsages::UNIFORM)
-}
-
-fn control_points(request: &FrameRequest) -> BufferSpec {
-    let bytes = size_of_val(&request.ramps.points[..]) as u64;
-    content_spec("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
-}
-
-/// The byte offset of the timestamps behind the counts of `groups` sheet groups.
-fn timestamps_at(groups: usize) -> u64 {
-    (size_of::<Tally>() as u64 + groups as u64 * 4).next_multiple_of(8)
-}
-
-/// The buffer for counts, followed by the timestamps of `passes` passes if they are timed.
-fn staging(timestamps: u64, timed: bool, passes: usize) -> BufferSpec {
-    let bytes = timestamps + if timed { passes as u64 * PASS_BYTES } else { 0 };
-    buffer_spec("sheetsplat.counts", bytes, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }

@@ -4,9 +4,12 @@ use wgpu::{BindGroup, Buffer, CommandEncoder, Texture, TextureFormat, TextureVie
 
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::gpu::classified_volume::Layer;
 use crate::gpu::counts::{GroupSlabs, Staging, Totals};
+use crate::gpu::layout::Band;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
+use crate::pass::join::JoinMode;
 use crate::rasterizer::fields::FieldFrame;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
@@ -18,23 +21,47 @@ pub(crate) struct PreparedFrame {
     /// The format and number of the sheets of the renderer that prepared it.
     pub(crate) sheets: (TextureFormat, u32),
     pub(crate) view: ViewGeometry,
-    pub(crate) drawing: Drawing,
+    /// The channels that share sheets: all, or one by one (SPEC §10).
+    pub(crate) layers: Vec<PreparedLayer>,
     /// Why it is drawn by quads although tiles were preferred.
     pub(crate) fallback: Option<RenderError>,
+    /// That of the layer that is drawn.
     pub(crate) compositing: CompositingBuffer,
-    pub(crate) uniform: Buffer,
-    pub(crate) control_points: Buffer,
+    /// The image of all layers, if there are several.
+    pub(crate) joined: Option<Joined>,
     pub(crate) resolve_groups: Vec<BindGroup>,
     /// The planes and surfaces that cut rays.
     pub(crate) cut: Buffer,
     /// The depths of first hits, if requested.
     pub(crate) first_hits: Option<FirstHits>,
     pub(crate) timer: Option<Timer>,
-    /// The totals, counted when first requested.
-    pub(crate) totals: Option<Totals>,
+    /// The totals of every layer, counted when first requested.
+    pub(crate) totals: Option<Vec<Totals>>,
     /// The staging buffer for a recorded frame's counts; `None` once they have been requested.
     pub(crate) staging: Option<Staging>,
     pub(crate) gpu_bytes: u64,
+}
+
+/// Channels that share sheets.
+#[derive(Debug)]
+pub(crate) struct PreparedLayer {
+    pub(crate) layer: Layer,
+    pub(crate) drawing: Drawing,
+    pub(crate) uniform: Buffer,
+    pub(crate) control_points: Buffer,
+}
+
+/// The sum, or the nearest, of the images of several layers.
+#[derive(Debug)]
+pub(crate) struct Joined {
+    pub(crate) mode: JoinMode,
+    pub(crate) compositing: CompositingBuffer,
+    /// One word per pixel, or a single one if first hits are not asked for.
+    pub(crate) hits: Buffer,
+    /// The frame's constants for its resolving.
+    pub(crate) uniform: Buffer,
+    /// For every layer a bind group for each band.
+    pub(crate) groups: Vec<Vec<BindGroup>>,
 }
 
 /// The depths of first hits.
@@ -57,32 +84,52 @@ pub(crate) enum Drawing {
 /// The parts of a view's last frame that the next one may reuse.
 #[derive(Debug, Default)]
 pub(crate) struct PreviousFrame {
-    pub(crate) drawing: Option<Drawing>,
+    /// None if there were other layers.
+    pub(crate) layers: Vec<PreviousLayer>,
     pub(crate) compositing: Option<CompositingBuffer>,
-    pub(crate) uniform: Option<Buffer>,
-    pub(crate) control_points: Option<Buffer>,
+    pub(crate) joined: Option<Joined>,
     pub(crate) cut: Option<Buffer>,
     /// The texture is kept so that a host that bound it need not bind it again.
     pub(crate) first_hits: Option<Texture>,
-    pub(crate) totals: Option<Totals>,
+    pub(crate) totals: Option<Vec<Totals>>,
     /// The staging buffer, if nobody is waiting for its counts.
     pub(crate) staging: Option<Buffer>,
 }
 
+/// The parts of a layer that the next frame may reuse.
+#[derive(Debug, Default)]
+pub(crate) struct PreviousLayer {
+    pub(crate) drawing: Option<Drawing>,
+    pub(crate) uniform: Option<Buffer>,
+    pub(crate) control_points: Option<Buffer>,
+}
+
 impl PreviousFrame {
-    /// The reusable parts for a frame of `view`, drawn into sheets of this format and number.
-    pub(crate) fn of(frame: Option<PreparedFrame>, sheets: (TextureFormat, u32), view: &ViewGeometry) -> Self {
+    /// The reusable parts for a frame of `view` in these layers and bands, drawn into sheets of this format and number.
+    pub(crate) fn of(
+        frame: Option<PreparedFrame>,
+        sheets: (TextureFormat, u32),
+        view: &ViewGeometry,
+        (layers, bands): (&[Layer], &[Band]),
+    ) -> Self {
         let Some(old) = frame else { return Self::default() };
         let same_size = old.compositing.size == view.size;
+        let has_bands = |buffer: &CompositingBuffer| same_size && buffer.bands.iter().map(|band| &band.band).eq(bands);
+        let same_layers = old.layers.iter().map(|layer| &layer.layer).eq(layers);
+        // Another renderer may have used other sheets.
+        let same_sheets = old.sheets == sheets;
+        let of_layer = |PreparedLayer { drawing, uniform, control_points, .. }| PreviousLayer {
+            drawing: same_sheets.then_some(drawing),
+            uniform: Some(uniform),
+            control_points: Some(control_points),
+        };
         Self {
-            // Another renderer may have used other sheets.
-            drawing: (old.sheets == sheets).then_some(old.drawing),
-            compositing: same_size.then_some(old.compositing),
-            uniform: Some(old.uniform),
-            control_points: Some(old.control_points),
+            layers: if same_layers { old.layers.into_iter().map(of_layer).collect() } else { Vec::new() },
+            compositing: Some(old.compositing).filter(has_bands),
+            joined: old.joined.filter(|joined| has_bands(&joined.compositing)),
             cut: Some(old.cut),
             first_hits: old.first_hits.filter(|_| same_size).map(|hits| hits.texture),
-            totals: old.totals.filter(|_| old.view == *view),
+            totals: old.totals.filter(|_| old.view == *view && same_layers),
             staging: old.staging.map(|staging| staging.buffer),
         }
     }
@@ -92,6 +139,25 @@ impl PreparedFrame {
     /// Bytes of GPU memory that the frame and its volume use.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         self.gpu_bytes
+    }
+
+    /// The only layer's drawing, or the first one's.
+    pub(crate) fn first_drawing(&self) -> Option<&Drawing> {
+        self.layers.first().map(|layer| &layer.drawing)
+    }
+}
+
+impl PreparedLayer {
+    /// Bytes of GPU memory.
+    pub(crate) fn gpu_bytes(&self) -> u64 {
+        self.drawing.gpu_bytes() + self.uniform.size() + self.control_points.size()
+    }
+}
+
+impl Joined {
+    /// Bytes of GPU memory.
+    pub(crate) fn gpu_bytes(&self) -> u64 {
+        self.compositing.gpu_bytes() + self.hits.size() + self.uniform.size()
     }
 }
 
@@ -116,13 +182,13 @@ impl Drawing {
         }
     }
 
-    /// Copies the frame's counts to the start of `staging`.
-    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer) {
+    /// Copies the frame's counts to a place in `staging`.
+    pub(crate) fn copy_counts(&self, encoder: &mut CommandEncoder, staging: &Buffer, at: u64) {
         match self {
-            Self::Quads(frame) => frame.copy_counts(encoder, staging),
-            Self::Fields(frame) => frame.copy_counts(encoder, staging),
-            Self::Tiles(frame) => frame.copy_counts(encoder, staging),
-            Self::Samples(frame) => frame.copy_counts(encoder, staging),
+            Self::Quads(frame) => frame.copy_counts(encoder, staging, at),
+            Self::Fields(frame) => frame.copy_counts(encoder, staging, at),
+            Self::Tiles(frame) => frame.copy_counts(encoder, staging, at),
+            Self::Samples(frame) => frame.copy_counts(encoder, staging, at),
         }
     }
 

@@ -11,20 +11,17 @@ use crate::gpu::classified_volume::{ClassifiedVolume, Touched};
 use crate::gpu::counts::PendingCounts;
 use crate::gpu::fault::scoped;
 use crate::gpu::gpu_volume::GpuVolume;
-use crate::image::channels::Joining;
 pub use crate::rasterizer::Prepared;
 use crate::renderer::pick::PendingPick;
-use crate::renderer::prepared_frame::PreparedFrame;
-use crate::scene::names::{COMPOSITINGS, name_of};
+use crate::renderer::prepared_frame::{Drawing, PreparedFrame, PreparedLayer};
 use crate::scene::{ImageSettings, Scene};
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::framing::Extent;
 use crate::settings::shading::{Light, Shading};
-use crate::settings::splatting::{Classification, Splatting, check_first_hit};
+use crate::settings::splatting::{Splatting, check_first_hit};
 use crate::settings::transfer_function::{TransferFunction, check_iso_ranges};
 use crate::settings::window::Window;
-use crate::volume::Volume;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters take effect
 /// with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare). A setter that refuses a value names the field, as reading a
@@ -42,60 +39,6 @@ pub struct SceneView {
     pub(crate) extent: OnceLock<Option<Extent>>,
 }
 
-/// Checks that this backend draws all channels of a volume.
-pub(crate) fn check_channels(volume: &Volume, scene: &Scene) -> Result<(), SettingError> {
-    let count = volume.channels().count();
-    let Splatting { compositing, .. } = scene.splatting;
-    let classification = scene.classification(volume);
-    if volume.colors().is_some() && classification == Classification::After {
-        let (found, allowed) =
-            ("\"after\" for a volume of colours with the backend gpu", "\"before\", or the backend cpu or reference");
-        return Err(SettingError::new("splatting.classification", found, allowed));
-    }
-    if let Some(number) = volume.further().iter().position(|channel| channel.colors().is_some()) {
-        let found = "colours in a channel after the first with the backend gpu";
-        let allowed = "colours in the first channel, or the backend cpu or reference";
-        return Err(SettingError::new(format!("channel[{}].volume", number + 1), found, allowed));
-    }
-    if count == 1 {
-        return Ok(());
-    }
-    if classification == Classification::After {
-        let found = format!("\"after\" for {count} channels with the backend gpu");
-        return Err(SettingError::new(
-            "splatting.classification",
-            found,
-            "\"before\", or the backend cpu or reference",
-        ));
-    }
-    if Joining::of(compositing, classification).is_some() {
-        let found = format!("{:?} for {count} channels with the backend gpu", name_of(COMPOSITINGS, compositing));
-        let allowed = "\"linear\", \"exponential\", \"xray\" or \"surface\", or the backend cpu or reference";
-        return Err(SettingError::new("splatting.compositing", found, allowed));
-    }
-    let has_labels = (1..).zip(&scene.further).find(|(_, channel)| !channel.transfer.labels.is_empty());
-    if let Some((number, _)) = has_labels {
-        let found = "tables of a channel after the first with the backend gpu";
-        let allowed = "no such tables, or the backend cpu or reference";
-        return Err(SettingError::new(format!("channel[{number}].transfer.label"), found, allowed));
-    }
-    let values = volume.values().len() as u64 * count as u64;
-    if values > u64::from(u32::MAX) {
-        let found = format!("{values} values in {count} channels");
-        return Err(SettingError::new("channel", found, format!("at most {}", u32::MAX)));
-    }
-    Ok(())
-}
-
-/// The scene with classification before splatting, if nothing states it and this backend draws a volume only so.
-fn drawable(volume: &Volume, scene: &Scene) -> Scene {
-    let mut drawable = scene.clone();
-    if scene.splatting.classification == Classification::Auto && check_channels(volume, scene).is_err() {
-        drawable.splatting.classification = Classification::Before;
-    }
-    drawable
-}
-
 impl SceneView {
     /// Uploads the bricks of the voxels that take part under a scene's transfer function to the volume's device. The scene's own volume is
     /// ignored.
@@ -107,13 +50,11 @@ impl SceneView {
         check_device(device, volume.device(), "the volume")?;
         scene.check()?;
         scene.check_volume(volume.volume())?;
-        let scene = &drawable(volume.volume(), scene);
-        check_channels(volume.volume(), scene)?;
         let transfer = scene.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
         let scene = scene.classified(volume.volume());
-        let classification = scene.splatting.classification;
-        let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, classification))?;
+        let splatting = &scene.splatting;
+        let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, splatting))?;
         Ok(Self { volume, scene, surfaces: None, first_hit: None, window: None, frame: None, extent: OnceLock::new() })
     }
 
@@ -199,14 +140,13 @@ impl SceneView {
     /// If a setting is invalid; then nothing changes.
     pub fn set_splatting(&mut self, splatting: Splatting) -> Result<(), SettingError> {
         splatting.check()?;
-        check_channels(self.volume.volume(), &Scene { splatting, ..self.scene.clone() })?;
         let Scene { clip, splatting: old, .. } = &self.scene;
         if !clip.is_empty() && splatting.radius != old.radius {
             self.volume.set_clip(clip.voxels(self.volume.grid(), splatting.radius));
         }
         self.scene.splatting = splatting;
         self.scene.splatting.classification = self.scene.classification(self.volume.volume());
-        self.volume.set_classification(self.scene.splatting.classification);
+        self.volume.set_splatting(&self.scene.splatting);
         Ok(())
     }
 
@@ -286,7 +226,7 @@ impl SceneView {
 
     /// The prepared frame's rasterizer, `"quads"` or `"tiles"`.
     pub fn rasterizer(&self) -> Option<&'static str> {
-        self.frame.as_ref().map(|frame| frame.drawing.rasterizer())
+        self.frame.as_ref()?.first_drawing().map(Drawing::rasterizer)
     }
 
     /// Why the prepared frame is drawn by quads although neither the scene nor the renderer requires them: a feature that the device lacks, or a
@@ -308,8 +248,9 @@ impl SceneView {
     pub fn counts(&mut self) -> Option<PendingCounts> {
         let (volume, frame) = (&self.volume, self.frame.as_mut()?);
         let staging = frame.staging.take()?;
-        let PreparedFrame { drawing, totals, view, .. } = frame;
-        let totals = totals.get_or_insert_with(|| volume.totals(view, &drawing.group_slabs())).clone();
+        let PreparedFrame { layers, totals, view, .. } = frame;
+        let of_layer = |of: &PreparedLayer| volume.totals(&of.layer, view, &of.drawing.group_slabs());
+        let totals = totals.get_or_insert_with(|| layers.iter().map(of_layer).collect()).clone();
         Some(PendingCounts::new(totals, staging))
     }
 }

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::{Scene, TransferSettings, VolumeSource};
-use crate::appearance::{Preset, channel_color, channel_display, one_of_several};
+use crate::appearance::{Preset, categories, channel_color, channel_display, labels_of_several, one_of_several};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Volume, builtin};
 
@@ -94,7 +94,8 @@ impl Scene {
 
     /// The complete transfer function for a volume and all of its channels ([`TransferSettings::resolve`]); an invisible channel has no opacity.
     /// Where a volume has several channels, those whose colours are not stated have their files', or else a colour each (magenta and green, then cyan,
-    /// magenta and yellow, …); those whose opacities are not, a window of their values each.
+    /// magenta and yellow, …); those whose opacities are not, a window of their values each. Label maps among them keep their labels' colours, unless a
+    /// preset shows projections.
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
         let mut channels = (0..).zip(volume.channels()).map(|(number, channel)| {
             if self.settings_of(number).visible {
@@ -114,13 +115,20 @@ impl Scene {
         if count == 1 {
             return settings.resolve(channel);
         }
+        let has_color = settings.color.is_some() || settings.colormap.is_some();
+        let has_opacity = settings.opacity.is_some();
+        // What the settings state in full needs no look at the values.
+        let shows_labels = !(has_color && has_opacity)
+            && settings.preset.is_none_or(Preset::keeps_labels)
+            && categories::is_label_map(channel);
         let chosen = |preset: Option<Preset>| match preset {
+            _ if shows_labels => labels_of_several(channel, preset),
+            None | Some(Preset::Confocal) => one_of_several(channel),
             Some(preset) if number > 0 => preset.transfer_of_further(channel),
             Some(preset) => preset.transfer(channel),
-            None => one_of_several(channel),
         };
-        let has_color = settings.color.is_some() || settings.colormap.is_some();
-        if has_color || settings.preset == Some(Preset::Fusion) {
+        let keeps_color = shows_labels || matches!(settings.preset, Some(Preset::Fusion | Preset::Labels));
+        if has_color || keeps_color {
             return settings.resolve_by(channel, chosen);
         }
         let own = channel.display().and_then(channel_display::color);
@@ -132,9 +140,13 @@ impl Scene {
     pub(super) fn explicit_channels(&self, volume: &Volume) -> Vec<Channel> {
         let channel = |(number, channel): (usize, &Volume)| {
             let settings = self.settings_of(number).into_owned();
-            let source = if number < 1 + self.further.len() { settings.volume } else { VolumeSource::Memory };
+            // A channel without a table is one of the first one's volume, which only that one's table describes.
+            let settings = match number <= self.further.len() {
+                true => settings,
+                false => Channel { visible: settings.visible, ..Channel::new(VolumeSource::Memory) },
+            };
             let name = settings.name.or_else(|| channel.channel_name().map(str::to_owned));
-            Channel { name, volume: source, transfer: self.transfer_of(number, volume, channel).into(), ..settings }
+            Channel { name, transfer: self.transfer_of(number, volume, channel).into(), ..settings }
         };
         (0..).zip(volume.channels()).map(channel).collect()
     }

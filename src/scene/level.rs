@@ -32,7 +32,9 @@ impl Scene {
         options: &ReadOptions,
         explicit: impl Fn(&Self, &Volume) -> Self,
     ) -> Result<Self, VolumeError> {
-        if options.level.is_some() || self.check().is_err() {
+        // No other format has levels.
+        let has_stores = cfg!(feature = "zarr");
+        if !has_stores || options.level.is_some() || self.check().is_err() {
             return Ok(self.clone());
         }
         let open = open_channels(self, options)?;

@@ -4,7 +4,10 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::{Channel, Scene, VolumeSource};
-use crate::volume::{self, Access, Labels, Selection, SpacedStore, Store, Volume, VolumeError, builtin, raw_store};
+use crate::appearance::{Preset, categories};
+use crate::volume::{
+    self, Access, Labels, Resampling, Selection, SpacedStore, Store, Volume, VolumeError, builtin, raw_store,
+};
 
 /// The scene's volume with all channels, on the first one's grid.
 pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeError> {
@@ -20,10 +23,17 @@ pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeE
         let key = format!("channel[{number}].volume");
         let own = channel(settings, &key, access)?;
         single(&own, number, settings)?;
-        own.onto(&volume, (&key, Path::new(&origin(&settings.volume))), access)
+        let resampling = if has_labels_for_values(settings, &own) { Resampling::Nearest } else { Resampling::Linear };
+        own.onto(&volume, resampling, (&key, Path::new(&origin(&settings.volume))), access)
     });
     let further = further.collect::<Result<_, VolumeError>>()?;
     volume.with_channels(&origin(&first.volume), further)
+}
+
+/// Whether the values of a channel's volume are labels, of which none lies between two others.
+fn has_labels_for_values(settings: &Channel, volume: &Volume) -> bool {
+    let is_declared = settings.transfer.preset == Some(Preset::Labels) && volume.labels().is_none();
+    categories::is_label_map(volume) || is_declared && categories::values(volume).is_some()
 }
 
 /// The scene's volume to be read by boxes; `None` if it has several channels or labels, or is no file.

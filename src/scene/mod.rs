@@ -6,6 +6,7 @@ mod level;
 mod load;
 pub(crate) mod names;
 mod open;
+mod overrides;
 mod reader;
 mod tables;
 mod writer;
@@ -29,7 +30,8 @@ use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::{Access, RawLayout, ReadOptions, Store, Volume, VolumeError};
 pub use channel::Channel;
 pub use open::OpenVolume;
-use reader::{OVERRIDE, Origins, Section, apply_override};
+use overrides::{OVERRIDE, apply_override};
+use reader::{Origins, Section};
 
 /// Why a scene could not be read.
 #[derive(Debug, thiserror::Error)]
@@ -197,7 +199,9 @@ impl TransferSettings {
 ///
 /// The readers below accept `--set` overrides, each `table.key=value` (or `table={…}` for a whole table), applied in order over the
 /// file's values. The value is TOML, or a string if it does not parse as TOML. An override of `volume.path` also removes
-/// `volume.builtin`; one of `volume.builtin` removes `volume.path` and the layout of a raw file.
+/// `volume.builtin`; one of `volume.builtin` removes `volume.path` and the layout of a raw file. Where a scene file has tables `[[channel]]`, keys of `volume`
+/// are those of the first channel, and `volume.time`, `level` and `spacing` also those of all channels that name its file. `volume.index` leaves one
+/// of these tables if the others name no volume: that of the channel with this number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
     /// The source of the volume. This, and all up to `transfer`, are those of the first channel.
@@ -393,16 +397,20 @@ impl Scene {
 
     /// Whether values are classified before or after splatting, for a volume (SPEC §9): as stated, or with [`Classification::Auto`] after
     /// it where the transfer function comes from a preset (except `xray`, `mip`, `confocal` and `labels`) or is chosen for the volume, unless
-    /// another setting excludes that or the volume is a label map ([`categories`]).
+    /// another setting excludes that or the volume, or one of several channels, is a label map ([`categories`]).
     pub fn classification(&self, volume: &Volume) -> Classification {
         let splatting = &self.splatting;
         if splatting.classification != Classification::Auto {
             return splatting.classification;
         }
+        let are_several = !volume.further().is_empty();
         let is_sharper = (0..).zip(volume.channels()).all(|(number, volume)| {
             let transfer = &self.settings_of(number).transfer;
             match transfer.preset {
-                Some(preset) => preset.is_classified_after(),
+                Some(preset) => {
+                    let may_be_labels = are_several && preset.is_classified_after() && preset.keeps_labels();
+                    preset.is_classified_after() && !(may_be_labels && categories::is_label_map(volume))
+                }
                 None => *transfer == TransferSettings::default() && !categories::is_label_map(volume),
             }
         });

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::names::{METHODS, name_of};
 use super::{Scene, load};
 use crate::error::setting::SettingError;
+use crate::parallel;
 use crate::settings::splatting::{Classification, Interpolation, Method, Splatting};
 use crate::volume::{Access, Grid, IndexedStore, ReadOptions, Store, StoreIndex, StreamedVolume, Volume, VolumeError};
 
@@ -125,7 +126,7 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
     let Some(of) = store.levels().get(level) else { return Ok(None) };
     let bytes = |dims: [u32; 3]| dims.into_iter().fold(4, |bytes: u64, n| bytes.saturating_mul(n.into()));
     // Every thread that draws or reads holds some chunks, beside those that wait for other tiles.
-    let least = bytes(of.chunk.to_array()).saturating_mul(4 * rayon::current_num_threads() as u64);
+    let least = bytes(of.chunk.to_array()).saturating_mul(4 * parallel::current_num_threads() as u64);
     if bytes(of.grid.dims.to_array()) <= memory || least > memory / 2 {
         return Ok(None);
     }

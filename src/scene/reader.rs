@@ -5,84 +5,12 @@ use std::ops::{Add, Mul};
 use glam::UVec3;
 use toml::{Table, Value};
 
+use super::overrides::OVERRIDE;
 use super::{ImageSettings, SceneError};
 use crate::error::setting::{Allowed, Found, Interval, SettingError};
 use crate::settings::economies::KEYS;
 use crate::settings::transfer_function::{Ramp, RampError};
 use crate::volume::{SIZES, dims_of};
-
-/// The origin of values set on the command line.
-pub(super) const OVERRIDE: &str = "--set";
-
-/// The maximum number of channels.
-pub(super) const MAX_CHANNELS: usize = 64;
-
-/// Applies one `--set` argument, `table.key=value` or `table=value`, and returns its key.
-pub(super) fn apply_override(root: &mut Table, argument: &str) -> Result<String, SceneError> {
-    let misused = |key: &str, found: &str, allowed: &str| SceneError::Invalid {
-        origin: OVERRIDE.to_owned(),
-        key: key.to_owned(),
-        found: found.to_owned(),
-        allowed: allowed.into(),
-    };
-    let usage = "table.key=value, as in splatting.slab_width=2.0";
-    let Some((key, text)) = argument.split_once('=') else { return Err(misused(argument, "no \"=\"", usage)) };
-    let (key, text) = (key.trim(), text.trim());
-    let value = text.parse().unwrap_or_else(|_| Value::String(text.to_owned()));
-    if key.split('.').any(str::is_empty) {
-        return Err(misused(argument, "an empty key", usage));
-    }
-    let (tables, name) = key.rsplit_once('.').map_or((None, key), |(tables, name)| (Some(tables), name));
-    let mut section = root;
-    let mut path = String::new();
-    for table in tables.into_iter().flat_map(|tables| tables.split('.')) {
-        path = if path.is_empty() { table.to_owned() } else { format!("{path}.{table}") };
-        let found = match table.strip_prefix("channel[").and_then(|rest| rest.strip_suffix(']')) {
-            Some(number) if path == table => {
-                let parsed = number.parse().ok().filter(|&number| number < MAX_CHANNELS);
-                let refused = || misused(key, number, &format!("a number below {MAX_CHANNELS} in brackets"));
-                channel_table(section, parsed.ok_or_else(refused)?)
-            }
-            _ => section.entry(table).or_insert_with(|| Value::Table(Table::new())),
-        };
-        section = match found {
-            Value::Table(section) => section,
-            other => {
-                return Err(misused(key, &format!("{path} = {}", typed(other)), &format!("{path} to be a table")));
-            }
-        };
-    }
-    // The two keys name the same thing, so the last one wins.
-    match key.split_once("].").map_or(key, |(_, of_channel)| of_channel) {
-        "volume.path" => _ = section.remove("builtin"),
-        "volume.builtin" => {
-            section.retain(|name, _| !["path", "dims", "type", "endian", "offset"].contains(&name));
-        }
-        "transfer.color" => _ = section.remove("colormap"),
-        "transfer.colormap" => _ = section.remove("color"),
-        _ => {}
-    }
-    section.insert(name.to_owned(), value);
-    Ok(key.to_owned())
-}
-
-/// The value of `[[channel]]` with a number. Empty tables are added up to it; the first takes in the tables of a scene of one channel.
-fn channel_table(root: &mut Table, number: usize) -> &mut Value {
-    if !root.contains_key("channel") {
-        let of_one = ["volume", "transfer"].map(|name| root.remove(name).map(|table| (name.to_owned(), table)));
-        let first = Value::Table(of_one.into_iter().flatten().collect());
-        root.insert("channel".to_owned(), Value::Array(vec![first]));
-    }
-    match &mut root["channel"] {
-        Value::Array(channels) => {
-            if channels.len() <= number {
-                channels.resize(number + 1, Value::Table(Table::new()));
-            }
-            &mut channels[number]
-        }
-        other => other,
-    }
-}
 
 /// The origin of each key's value.
 pub(super) struct Origins<'a> {
@@ -386,7 +314,7 @@ impl<'a> Entry<'a> {
 }
 
 /// A value as TOML, and its type.
-fn typed(value: &Value) -> String {
+pub(super) fn typed(value: &Value) -> String {
     format!("{} ({})", concise(value), value.type_str())
 }
 

@@ -8,7 +8,8 @@ use glam::DVec3;
 use super::names::{
     BOXES, CLASSIFICATIONS, COMPOSITINGS, ENDIANS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS,
 };
-use super::reader::{Entry, LABEL, MAX_CHANNELS, Section};
+use super::overrides::MAX_CHANNELS;
+use super::reader::{Entry, LABEL, Section};
 use super::{Channel, ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::error::setting::Interval;

@@ -18,7 +18,7 @@ impl KeptCoefficients {
     pub(super) fn get_or_compute<E>(
         &self,
         kernel: (f64, f64),
-        compute: impl FnOnce() -> Result<Vec<f32>, E>,
+        compute: impl FnOnce() -> Result<Arc<[f32]>, E>,
     ) -> Result<Arc<[f32]>, E> {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(Kept { coefficients, .. }) = kept.as_ref().filter(|kept| kept.kernel == kernel) {
@@ -26,7 +26,7 @@ impl KeptCoefficients {
         }
         // The former ones make room before more are computed.
         *kept = None;
-        let coefficients: Arc<[f32]> = compute()?.into();
+        let coefficients = compute()?;
         *kept = Some(Kept { kernel, coefficients: Arc::clone(&coefficients) });
         Ok(coefficients)
     }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use glam::{DVec3, DVec4, UVec3};
-use rayon::prelude::*;
 
 use super::{SampleType, Volume, VolumeError};
+use crate::parallel::prelude::*;
 
 /// Red, green, blue and A of a voxel, each from 0 to [`u16::MAX`], which stands for 1. Numbers of 8 and 16 bits are exact.
 pub type Texel = [u16; 4];

@@ -4,10 +4,10 @@ use std::fmt::Write;
 use std::sync::Arc;
 
 use glam::UVec3;
-use rayon::prelude::*;
 
 use super::range::{EMPTY, union};
 use super::{Store, StoreFacts, StoreLevel, VolumeError};
+use crate::parallel::prelude::*;
 
 /// The first line of a file.
 const TITLE: &str = "sheetsplat index 1";

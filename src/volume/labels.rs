@@ -92,6 +92,11 @@ impl Volume {
         &self.label_names
     }
 
+    /// Whether the values are known to be labels, whatever they look like: they were resampled as labels, or their file names them.
+    pub(crate) fn is_known_label_map(&self) -> bool {
+        self.is_label_map || self.labels.is_none() && !self.label_names.is_empty()
+    }
+
     /// The label of the voxel at an index in memory; `None` if the volume is not segmented.
     ///
     /// # Panics

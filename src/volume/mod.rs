@@ -61,7 +61,6 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
-use rayon::prelude::*;
 
 pub(crate) use access::Access;
 pub use access::ReadOptions;
@@ -80,6 +79,7 @@ pub use labels::Labels;
 use loaded::{Levels, Loaded};
 pub use orientation::{Orientation, PatientSide};
 pub use raw::RawLayout;
+pub(crate) use resample::Resampling;
 pub use sample::sample;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
@@ -90,6 +90,7 @@ pub use streamed::StreamedVolume;
 
 use crate::error::setting::SettingError;
 pub use crate::error::volume::VolumeError;
+use crate::parallel::prelude::*;
 use crate::stats::StoreCounts;
 
 /// How a file stores a volume.
@@ -128,6 +129,8 @@ pub struct Volume {
     colors: Option<Arc<[Texel]>>,
     labels: Option<Arc<[u16]>>,
     label_names: BTreeMap<u16, String>,
+    /// Whether the values are known to be labels.
+    is_label_map: bool,
     orientation: Option<Orientation>,
     unit: Option<String>,
     encoding: Option<Encoding>,
@@ -189,6 +192,7 @@ impl Volume {
             colors: None,
             labels: None,
             label_names: BTreeMap::new(),
+            is_label_map: false,
             orientation: None,
             unit: None,
             encoding: None,
@@ -335,7 +339,7 @@ impl Volume {
     pub(crate) fn coefficients<E>(
         &self,
         kernel: (f64, f64),
-        compute: impl FnOnce() -> Result<Vec<f32>, E>,
+        compute: impl FnOnce() -> Result<Arc<[f32]>, E>,
     ) -> Result<Arc<[f32]>, E> {
         self.coefficients.get_or_compute(kernel, compute)
     }

@@ -92,19 +92,24 @@ fn parse(path: &Path, header: &str) -> Result<(Samples, Series), VolumeError> {
     };
 
     let allowed = format!(
-        "three dimensions z, y, x: {SIZES}; in C order also z, y, x and 3 or 4 of a colour, or c, z, y, x, or t, c, z, y, x, with at most {MAX_CHANNELS} channels"
+        "three dimensions z, y, x: {SIZES}; or z, y, x and 3 or 4 of a colour, or c, z, y, x, or t, c, z, y, x, with at most {MAX_CHANNELS} channels"
     );
     let shape = field("shape", &allowed)?;
     let dims = || -> Option<(UVec3, Series)> {
         let (sizes, _) = shape.strip_prefix('(')?.split_once(')')?;
         let sizes = sizes.trim_end().strip_suffix(',').unwrap_or(sizes);
         let sizes: Option<Vec<u32>> = sizes.split(',').map(|size| size.trim().parse().ok()).collect();
-        let (sizes, order) = (sizes?, SeriesOrder::ChannelsFirst);
-        let ([z, y, x], series) = match *sizes.as_slice() {
+        // In Fortran order, times and channels change first, and the numbers of a colour last.
+        let order = if z_fastest { SeriesOrder::TimesInChannels } else { SeriesOrder::ChannelsFirst };
+        let colors = |components: u32| {
+            let series = Series::of_colors(components, 1);
+            if z_fastest { Series { order: SeriesOrder::ChannelsFirst, ..series } } else { series }
+        };
+        let ([z, y, x], series) = match *sizes?.as_slice() {
             [z, y, x] => ([z, y, x], Series::default()),
-            [z, y, x, components @ 3..=4] if !z_fastest => ([z, y, x], Series::of_colors(components, 1)),
-            [channels, z, y, x] if !z_fastest => ([z, y, x], Series { channels, times: 1, order, is_color: false }),
-            [times, channels, z, y, x] if !z_fastest => ([z, y, x], Series { channels, times, order, is_color: false }),
+            [z, y, x, components @ 3..=4] => ([z, y, x], colors(components)),
+            [channels, z, y, x] => ([z, y, x], Series { channels, times: 1, order, is_color: false }),
+            [times, channels, z, y, x] => ([z, y, x], Series { channels, times, order, is_color: false }),
             _ => return None,
         };
         let is_some = series.count() > 0 && series.channels <= MAX_CHANNELS;

@@ -4,13 +4,22 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
-use rayon::prelude::*;
 
 use super::access::Access;
 use super::{Orientation, Texel, Volume, VolumeError, invalid};
+use crate::parallel::prelude::*;
 
 /// Places that differ by less, in voxels, are the same.
 const SAME_PLACE: f64 = 1e-4;
+
+/// How values are found between voxels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Resampling {
+    /// Trilinearly, for amounts.
+    Linear,
+    /// The nearest voxel's, for values that are labels.
+    Nearest,
+}
 
 /// The map from voxels of one grid to those of another along each axis of the first.
 struct Placement {
@@ -51,9 +60,15 @@ impl Placement {
 }
 
 impl Volume {
-    /// The volume on another one's grid: values linearly, labels by the nearest one. A voxel beyond the centres of this volume's voxels, or beside
+    /// The volume on another one's grid: values as stated, labels by the nearest one. A voxel beyond the centres of this volume's voxels, or beside
     /// a hole, becomes a hole. `key` and `origin` name the volume in errors and in the warning that says that it was resampled.
-    pub(crate) fn onto(self, grid: &Self, (key, origin): (&str, &Path), access: &Access) -> Result<Self, VolumeError> {
+    pub(crate) fn onto(
+        self,
+        grid: &Self,
+        resampling: Resampling,
+        (key, origin): (&str, &Path),
+        access: &Access,
+    ) -> Result<Self, VolumeError> {
         let placement = Placement::new(grid, &self);
         let (dims, own_last) = (grid.dims(), self.dims().as_dvec3() - 1.0);
         if dims == self.dims() && placement.is_identity(own_last) {
@@ -66,20 +81,24 @@ impl Volume {
         access.reserve(origin, key, format!("{count} voxels on the first channel's grid"), bytes)?;
         let place = |index: u32| placement.at(grid.grid().voxel_at(index).as_dvec3());
         let is_inside = |at: DVec3| at.cmpge(DVec3::splat(-SAME_PLACE)).all() && at.cmple(own_last + SAME_PLACE).all();
-        let values: Vec<f32> = (0..count)
-            .into_par_iter()
-            .map(place)
-            .map(|at| match is_inside(at) {
-                true => self.between(at.clamp(DVec3::ZERO, own_last), |voxel| self.value(voxel).into()) as f32,
-                false => f32::NAN,
-            })
-            .collect();
+        let value = |at: DVec3| {
+            if !is_inside(at) {
+                return f32::NAN;
+            }
+            let at = at.clamp(DVec3::ZERO, own_last);
+            let linear = self.between(at, |voxel| self.value(voxel).into()) as f32;
+            // Beside a hole both are holes.
+            if resampling == Resampling::Linear || linear.is_nan() { linear } else { self.value(at.round().as_uvec3()) }
+        };
+        let values: Vec<f32> = (0..count).into_par_iter().map(place).map(value).collect();
         if values.iter().all(|value| value.is_nan()) {
             let name = origin.display().to_string();
             let [own, other] = [&self, grid].map(bounds);
             return Err(invalid(&name, key, own, format!("a box that overlaps the first channel's, {other}")));
         }
-        log::warn!("{}: {key}: resampled from {} to {dims} voxels, the first channel's", origin.display(), self.dims());
+        let (name, own) = (origin.display(), self.dims());
+        let nearest = if resampling == Resampling::Nearest { ", each label the nearest one" } else { "" };
+        log::warn!("{name}: {key}: resampled from {own} to {dims} voxels, the first channel's{nearest}");
         let labels: Option<Arc<[u16]>> = self.labels().map(|labels| {
             let nearest = |index: u32| {
                 let at = place(index);
@@ -102,6 +121,7 @@ impl Volume {
         Ok(Self {
             colors,
             labels,
+            is_label_map: resampling == Resampling::Nearest,
             label_names,
             unit,
             encoding,
@@ -165,7 +185,7 @@ mod tests {
             Volume::piece(grid, values)
         };
         let access = Access::new(&ReadOptions::default()).unwrap();
-        let onto = of(coarser).onto(&of(finest), ("channel", Path::new("file")), &access).unwrap();
+        let onto = of(coarser).onto(&of(finest), Resampling::Linear, ("channel", Path::new("file")), &access).unwrap();
         let mut inside = 0;
         for index in 0..finest.dims.element_product() {
             let (found, expected) = (onto.values()[index as usize], position(&finest, index));

@@ -1,9 +1,9 @@
 //! Samples of stores: as many values as fit into memory, from which histograms, presets and the camera's frame are taken.
 
 use glam::{DVec3, UVec3};
-use rayon::prelude::*;
 
 use super::{Grid, Store, StoreLevel, Volume, VolumeError, invalid, punch_holes};
+use crate::parallel::prelude::*;
 use crate::stats::StoreCounts;
 
 /// The maximum number of chunks that are read of a level of which not all values fit.

@@ -26,6 +26,9 @@ pub(super) struct Series {
 pub(super) enum SeriesOrder {
     /// The channels of a voxel lie side by side.
     Interleaved,
+    /// All times of a voxel lie side by side in each of its channels, and these side by side.
+    #[cfg(any(feature = "codecs", feature = "npy"))]
+    TimesInChannels,
     /// Whole volumes, of which all channels of a time lie together.
     ChannelsFirst,
     /// Whole volumes, of which all times of a channel lie together.
@@ -133,10 +136,19 @@ impl Stream {
             let allowed = format!("{total} bytes ({} volumes of {} samples)", series.count(), samples.count());
             return Err(invalid(&self.path, "data", format!("{left} bytes"), allowed));
         }
-        if series.order == SeriesOrder::Interleaved {
-            let time = u64::from(selection.time.unwrap_or(0));
-            self.skip(time * u64::from(series.channels) * samples.bytes())?;
-            return self.interleaved(samples, (series.channels, channels), window || series.times > 1);
+        let time = selection.time.unwrap_or(0);
+        match series.order {
+            SeriesOrder::Interleaved => {
+                self.skip(u64::from(time) * u64::from(series.channels) * samples.bytes())?;
+                let numbers = channels.map(u64::from);
+                return self.interleaved(samples, (series.channels.into(), numbers), window || series.times > 1);
+            }
+            #[cfg(any(feature = "codecs", feature = "npy"))]
+            SeriesOrder::TimesInChannels => {
+                let numbers = channels.map(|channel| u64::from(channel) * u64::from(series.times) + u64::from(time));
+                return self.interleaved(samples, (series.count(), numbers), window);
+            }
+            _ => {}
         }
         let (mut values, mut at) = (Vec::new(), 0);
         for channel in channels {
@@ -168,24 +180,28 @@ impl Stream {
         Ok(Located { path: self.path.clone(), at, samples: *samples, series: *series })
     }
 
-    /// The samples of some of `count` channels, of which each voxel's lie side by side.
+    /// The samples with some numbers, of `count` that each voxel has side by side.
     fn interleaved<T: Voxel>(
         self,
         samples: &Samples,
-        (count, channels): (u32, Range<u32>),
+        (count, numbers): (u64, impl Iterator<Item = u64>),
         window: bool,
     ) -> Result<Vec<T>, VolumeError> {
         let [x, y, z] = samples.dims.to_array().map(u64::from);
-        let Some(dims) = dims_of([x * u64::from(count), y, z]).filter(|_| !samples.z_fastest) else {
+        // They count as voxels along the axis that changes first.
+        let sides = if samples.z_fastest { [x, y, z.saturating_mul(count)] } else { [x.saturating_mul(count), y, z] };
+        let Some(dims) = dims_of(sides) else {
             let found = format!("{count} channels of {} voxels", samples.count());
-            return Err(invalid(&self.path, "sizes", found, "x fastest, and at most 4294967295 samples"));
+            return Err(invalid(&self.path, "sizes", found, "at most 4294967295 samples"));
         };
         let (path, access) = (self.path.clone(), self.access.clone());
         let all: Vec<T> = self.samples(&Samples { dims, ..*samples }, window)?;
+        // Those of a voxel lie together, or where z changes first, those of a slice.
+        let together = if samples.z_fastest { (x * y) as usize } else { 1 };
         let mut values = Vec::new();
-        for channel in channels {
+        for number in numbers {
             samples.reserve::<T>(&path, &access)?;
-            values.extend(all.iter().skip(channel as usize).step_by(count as usize));
+            values.extend(all.chunks(together).skip(number as usize).step_by(count as usize).flatten().copied());
         }
         Ok(values)
     }

@@ -8,7 +8,6 @@
 use std::path::Path;
 
 use glam::{DMat3, DVec3, UVec3};
-use rayon::prelude::*;
 
 use super::VolumeError;
 use super::access::Access;
@@ -16,6 +15,7 @@ use super::loaded::Loaded;
 use super::orientation::{MAX_COSINE, lengths_and_directions};
 use super::samples::{Voxel, dims_of};
 use super::source::invalid;
+use crate::parallel::prelude::*;
 
 /// The maximum angle in degrees between an axis and its orthogonal direction. Flatter volumes have damaged headers.
 const MAX_DEGREES: f64 = 80.0;

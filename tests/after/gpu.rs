@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use sheetsplat::headless::readback;
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host};
 use sheetsplat::internals::view_geometry::ViewGeometry;
@@ -15,7 +15,7 @@ use sheetsplat::volume::{Labels, Volume, builtin};
 use crate::common::compare::{assert_at_least, assert_at_most, decibels};
 use crate::common::images::{largest_difference, rms};
 use crate::common::surfaces::{DepthRange, surfaces};
-use crate::common::{COMPOSITINGS, camera, gpu, transfer};
+use crate::common::{BY_AMOUNTS, COMPOSITINGS, Drawing, RASTERIZERS, camera, gpu, transfer};
 use crate::{eye, render, scene};
 
 /// A small head on a grid with such an aspect, semi-transparent, with a step in its opacity.
@@ -25,16 +25,28 @@ fn head(spacing: [f64; 3]) -> (Volume, Scene) {
         &[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])],
         &[(30.0, 0.0), (70.0, 0.3), (71.0, 0.02), (150.0, 0.0), (200.0, 0.8)],
     );
-    (scene.splatting.culling, scene.splatting.rasterizer) = (false, Rasterizer::Quads);
+    scene.splatting.culling = false;
     scene.camera = camera([0.4, 0.9, -0.3], 30.0);
     (builtin::volume("head:24").unwrap().with_spacing("head", DVec3::from(spacing)).unwrap(), scene)
 }
 
-/// The image of the GPU against the twin's, dB. The twin's shows something: at least a hundredth of its pixels, in more than one colour.
-fn accuracy(volume: &Volume, scene: &Scene) -> f64 {
-    let (ours, expected) = (gpu().render_volume(volume.clone(), scene).unwrap().image, render(volume, scene));
+/// The rasterizers that draw a compositing.
+fn rasterizers(compositing: Compositing) -> &'static [Rasterizer] {
+    let count = if BY_AMOUNTS.contains(&compositing) { 2 } else { 1 };
+    &RASTERIZERS[..count]
+}
+
+/// Asserts that the images by all rasterizers are the twin's to some dB. The twin's shows something: at least a hundredth of its pixels, in more than
+/// one colour.
+fn assert_twins(gpu: &GpuHeadless, (volume, scene): (&Volume, &Scene), least: f64, case: &str) {
+    let expected = render(volume, scene);
     assert_shows(&expected, scene);
-    decibels(rms(&ours, &expected))
+    for &rasterizer in rasterizers(scene.splatting.compositing) {
+        let image = Drawing::By(rasterizer).render(gpu, volume, scene).image;
+        let measured = decibels(rms(&image, &expected));
+        println!("{case}, {rasterizer:?}: {measured:.1} dB");
+        assert_at_least(measured, least, format_args!("{case}, {rasterizer:?}"));
+    }
 }
 
 fn assert_shows(image: &Image, scene: &Scene) {
@@ -76,6 +88,7 @@ fn for_all(mut scene: Scene, compositing: Compositing) -> Scene {
 
 #[test]
 fn images_are_the_twins() {
+    let gpu = gpu();
     for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 2.5]] {
         let (volume, base) = head(spacing);
         let textured = textured(&volume);
@@ -88,12 +101,10 @@ fn images_are_the_twins() {
                     scene.camera.projection = projection;
                     scene.splatting.interpolation = interpolation;
                     (scene.shading.gradient, scene.splatting.falloff) = (gradient, falloff);
-                    let measured =
-                        accuracy(if compositing == Compositing::Minimum { &textured } else { &volume }, &scene);
+                    let volume = if compositing == Compositing::Minimum { &textured } else { &volume };
                     let case = format!("{spacing:?} {compositing:?} {interpolation:?} {projection:?}");
-                    println!("{case}: {measured:.1} dB");
                     let required = if gradient == Gradient::Kernel { 55.0 } else { 60.0 };
-                    assert_at_least(measured, required, case);
+                    assert_twins(&gpu, (volume, &scene), required, &case);
                 }
             }
         }
@@ -103,12 +114,16 @@ fn images_are_the_twins() {
 /// Another setting of a scene.
 type Change = fn(&mut Scene);
 
-/// Thin and thick slabs, minified voxels, the other order, gradient opacity, iso-ranges, cuts.
+/// Thin and thick slabs, other kernels, minified voxels, the other order, gradient opacity, iso-ranges, cuts.
 #[test]
 fn settings_are_the_twins() {
-    let cases: [(&str, Change); 11] = [
+    let gpu = gpu();
+    let cases: [(&str, Change); 14] = [
         ("thin", |scene| scene.splatting.slab_width = 0.3),
         ("thick", |scene| scene.splatting.slab_width = 3.0),
+        ("radius 1.4", |scene| scene.splatting.radius = 1.4),
+        ("radius 2.7", |scene| scene.splatting.radius = 2.7),
+        ("falloff 3", |scene| scene.splatting.falloff = 3.0),
         ("minified", |scene| scene.camera = camera([0.4, 0.9, -0.3], 120.0)),
         ("back to front", |scene| scene.splatting.order = Order::BackToFront),
         ("unshaded", |scene| scene.shading.enabled = false),
@@ -139,10 +154,8 @@ fn settings_are_the_twins() {
                 let mut scene = for_all(scene, compositing);
                 change(&mut scene);
                 scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-                let measured = accuracy(&volume, &scene);
                 let case = format!("{name} {compositing:?} {projection:?}");
-                println!("{case}: {measured:.1} dB");
-                assert_at_least(measured, 60.0, case);
+                assert_twins(&gpu, (&volume, &scene), 60.0, &case);
             }
         }
     }
@@ -153,6 +166,7 @@ fn settings_are_the_twins() {
 #[test]
 fn culling_keeps_its_promise() {
     const THRESHOLD: f64 = 0.9;
+    let gpu = gpu();
     for compositing in
         [Compositing::Linear, Compositing::Exponential, Compositing::Xray, Compositing::Maximum, Compositing::Surface]
     {
@@ -165,19 +179,24 @@ fn culling_keeps_its_promise() {
             scene.transfer = transfer(&colors, &[(30.0, 0.0), (60.0, 0.9)]);
             scene = for_all(scene, compositing);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-            let whole = gpu().render_volume(volume.clone(), &scene).unwrap();
-            assert_shows(&whole.image, &scene);
-            scene.splatting.culling = true;
-            let culled = gpu().render_volume(volume, &scene).unwrap();
-            let farthest = largest_difference(&whole.image, &culled.image);
-            let is_gradual = matches!(compositing, Compositing::Linear | Compositing::Exponential);
-            let allowed = if is_gradual { 1.0 - THRESHOLD + 1e-5 } else { 1e-5 };
-            assert_at_most(farthest, allowed, format_args!("{compositing:?} {projection:?}"));
-            let [all, drawn] = [whole, culled].map(|rendering| rendering.stats.counts.sections_rasterized);
-            println!("{compositing:?} {projection:?}: {farthest:.5}, {drawn} of {all}");
-            assert!(drawn <= all, "{compositing:?}: {drawn} of {all}");
-            if is_gradual || compositing == Compositing::Surface {
-                assert!(drawn < all * 9 / 10, "{compositing:?}: {drawn} of {all}");
+            for &rasterizer in rasterizers(compositing) {
+                scene.splatting.culling = false;
+                let drawing = Drawing::By(rasterizer);
+                let whole = drawing.render(&gpu, &volume, &scene);
+                assert_shows(&whole.image, &scene);
+                scene.splatting.culling = true;
+                let culled = drawing.render(&gpu, &volume, &scene);
+                let farthest = largest_difference(&whole.image, &culled.image);
+                let is_gradual = matches!(compositing, Compositing::Linear | Compositing::Exponential);
+                let allowed = if is_gradual { 1.0 - THRESHOLD + 1e-5 } else { 1e-5 };
+                let case = format!("{compositing:?} {projection:?} {rasterizer:?}");
+                assert_at_most(farthest, allowed, &case);
+                let [all, drawn] = [whole, culled].map(|rendering| rendering.stats.counts.sections_rasterized);
+                println!("{case}: {farthest:.5}, {drawn} of {all}");
+                assert!(drawn <= all, "{case}: {drawn} of {all}");
+                if is_gradual || compositing == Compositing::Surface {
+                    assert!(drawn < all * 9 / 10, "{case}: {drawn} of {all}");
+                }
             }
         }
     }
@@ -186,23 +205,22 @@ fn culling_keeps_its_promise() {
 /// Volumes with holes, and labels with their own tables, one of them invisible.
 #[test]
 fn holes_and_labels_are_the_twins() {
+    let gpu = gpu();
     for compositing in COMPOSITINGS {
         for projection in [None, Some(eye(50.0))] {
             let mut scene = for_all(head([1.0, 1.0, 1.5]).1, compositing);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-            holes_and_labels(scene);
+            holes_and_labels(&gpu, scene);
         }
     }
 }
 
-fn holes_and_labels(mut scene: Scene) {
+fn holes_and_labels(gpu: &GpuHeadless, mut scene: Scene) {
     let compositing = scene.splatting.compositing;
     let (volume, _) = head([1.0, 1.0, 1.5]);
     let hollow = (0..).zip(volume.values()).map(|(at, &v)| if at % 97 < 3 { f32::NAN } else { v }).collect();
     let hollow = Volume::new("hollow", volume.dims(), volume.grid().spacing, hollow).unwrap();
-    let measured = accuracy(&hollow, &scene);
-    println!("holes {compositing:?}: {measured:.1} dB");
-    assert_at_least(measured, 60.0, format_args!("holes, {compositing:?}"));
+    assert_twins(gpu, (&hollow, &scene), 60.0, &format!("holes, {compositing:?}"));
     let values = (0..).zip(volume.values()).map(|(at, _)| (at / 9 % 4) as u16).collect();
     let (dims, origin) = (volume.dims(), "labels".to_owned());
     let labels = Labels { origin, dims, spacing: None, values, names: BTreeMap::new() };
@@ -210,9 +228,7 @@ fn holes_and_labels(mut scene: Scene) {
     let own =
         LabelTables { opacity: Some(Ramp::new(vec![(20.0, 0.0), (90.0, 0.7)]).unwrap()), ..LabelTables::default() };
     scene.transfer.labels = [(1, own), (2, LabelTables { visible: false, ..LabelTables::default() })].into();
-    let measured = accuracy(&labelled, &scene);
-    println!("labels {compositing:?}: {measured:.1} dB");
-    assert_at_least(measured, 60.0, format_args!("labels, {compositing:?}"));
+    assert_twins(gpu, (&labelled, &scene), 60.0, &format!("labels, {compositing:?}"));
 }
 
 /// Where all values around are equal, no pixel takes the rounding of their sums for a gradient.
@@ -265,25 +281,29 @@ fn surfaces_and_first_hits_are_the_twins() {
             assert_shows(&expected.image, &scene);
             let whole = render(&volume, &scene);
             assert!(rms(&whole, &expected.image) > 1e-3, "{compositing:?}: the surface cuts nothing");
-            let mut drawn = gpu.view(volume.clone(), &scene).unwrap();
-            let unit = volume.grid().unit();
-            let planes = [if projection.is_some() { 1.0 } else { 0.01 }, 1000.0];
-            let given = surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &depths, [case, 3]);
-            drawn.set_surfaces(Some(given)).unwrap();
-            drawn.set_first_hit(first_hit).unwrap();
-            let image = gpu.draw(&mut drawn).unwrap().image;
-            let measured = decibels(rms(&image, &expected.image));
-            println!("{compositing:?} {projection:?}: {measured:.1} dB");
-            assert_at_least(measured, 60.0, format_args!("{compositing:?} {projection:?}"));
-            let Some(texture) = drawn.first_hits() else { continue };
-            let bytes = readback::texture(gpu.device(), gpu.queue(), texture).unwrap();
-            let hits = bytemuck::pod_collect_to_vec::<_, f32>(&bytes).into_iter().map(|depth| f64::from(depth) / unit);
-            let hits: Vec<f64> = hits.collect();
-            assert_eq!(hits.len(), expected.first_hits.len());
-            assert!(hits.iter().filter(|hit| hit.is_finite()).count() > hits.len() / 200, "{compositing:?}: few hits");
-            let is_close = |(hit, expected): &(&f64, &f64)| hit == expected || (**hit - **expected).abs() < 2e-3;
-            let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
-            assert!(off <= hits.len() / 400, "{compositing:?} {projection:?}: {off} of {} hits", hits.len());
+            for &rasterizer in rasterizers(compositing) {
+                scene.splatting.rasterizer = rasterizer;
+                let what = format!("{compositing:?} {projection:?} {rasterizer:?}");
+                let mut drawn = gpu.view(volume.clone(), &scene).unwrap();
+                let unit = volume.grid().unit();
+                let planes = [if projection.is_some() { 1.0 } else { 0.01 }, 1000.0];
+                let given = surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &depths, [case, 3]);
+                drawn.set_surfaces(Some(given)).unwrap();
+                drawn.set_first_hit(first_hit).unwrap();
+                let image = gpu.draw(&mut drawn).unwrap().image;
+                let measured = decibels(rms(&image, &expected.image));
+                println!("{what}: {measured:.1} dB");
+                assert_at_least(measured, 60.0, &what);
+                let Some(texture) = drawn.first_hits() else { continue };
+                let bytes = readback::texture(gpu.device(), gpu.queue(), texture).unwrap();
+                let hits = bytemuck::pod_collect_to_vec::<_, f32>(&bytes).into_iter().map(f64::from);
+                let hits: Vec<f64> = hits.map(|depth| depth / unit).collect();
+                assert_eq!(hits.len(), expected.first_hits.len());
+                assert!(hits.iter().filter(|hit| hit.is_finite()).count() > hits.len() / 200, "{what}: few hits");
+                let is_close = |(hit, expected): &(&f64, &f64)| hit == expected || (**hit - **expected).abs() < 2e-3;
+                let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
+                assert!(off <= hits.len() / 400, "{what}: {off} of {} hits", hits.len());
+            }
         }
     }
 }
@@ -291,6 +311,7 @@ fn surfaces_and_first_hits_are_the_twins() {
 /// The counts of un-culled frames are the twin's.
 #[test]
 fn counts_are_the_twins() {
+    let gpu = gpu();
     for compositing in COMPOSITINGS {
         for projection in [None, Some(eye(200.0))] {
             // One bright voxel and one dark voxel, one of which has an opacity.
@@ -310,7 +331,6 @@ fn counts_are_the_twins() {
             scene.transfer.opacity = Some(Ramp::new(opacity).unwrap());
             scene.splatting.tiles = false;
             let expected = reference::count(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
-            let ours = gpu().render_volume(volume.clone(), &scene).unwrap().stats.counts;
             let of = |counts: &Counts| {
                 [
                     counts.voxels_total,
@@ -320,11 +340,15 @@ fn counts_are_the_twins() {
                     counts.sheets,
                 ]
             };
-            println!("{compositing:?} {projection:?}: {:?}", of(&ours));
-            assert_eq!(of(&ours), of(&expected), "{compositing:?} {projection:?}");
-            assert!(ours.voxels_in_range > 0);
-            let is_average = compositing == Compositing::Average;
-            assert_eq!(ours.voxels_in_range == ours.voxels_total, is_average, "{compositing:?}: {:?}", of(&ours));
+            for &rasterizer in rasterizers(compositing) {
+                let what = format!("{compositing:?} {projection:?} {rasterizer:?}");
+                let ours = Drawing::By(rasterizer).render(&gpu, &volume, &scene).stats.counts;
+                println!("{what}: {:?}", of(&ours));
+                assert_eq!(of(&ours), of(&expected), "{what}");
+                assert!(ours.voxels_in_range > 0);
+                let is_average = compositing == Compositing::Average;
+                assert_eq!(ours.voxels_in_range == ours.voxels_total, is_average, "{what}: {:?}", of(&ours));
+            }
         }
     }
 }
@@ -346,12 +370,12 @@ fn memory_is_estimated() {
 /// An iso-range that is a single value has a surface where values pass it.
 #[test]
 fn surfaces_of_a_single_value_are_the_twins() {
+    let gpu = gpu();
     let (volume, scene) = head([1.0, 1.0, 1.5]);
     let mut scene = for_all(scene, Compositing::Surface);
     scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
     for value in [60.0, 100.3] {
         scene.transfer.iso_ranges = Some(vec![[value, value]]);
-        let measured = accuracy(&volume, &scene);
-        assert_at_least(measured, 60.0, format!("{value}"));
+        assert_twins(&gpu, (&volume, &scene), 60.0, &format!("{value}"));
     }
 }

@@ -1,7 +1,7 @@
 //! Volumes of colours (SPEC §10): the voxel's own colour, opacity over its luminance times A.
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::Backend;
+use sheetsplat::headless::{Backend, GpuHeadless};
 use sheetsplat::settings::{Classification, Compositing, Gradient, Interpolation, Rasterizer, Splatting};
 use sheetsplat::volume::{SampleType, Volume};
 use sheetsplat::{GpuVolume, Scene};
@@ -65,32 +65,78 @@ fn the_native_backend_draws_what_the_twin_draws() {
     }
 }
 
+/// Compares the GPU's images with the twin's.
+fn assert_is_the_twins(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) {
+    let Splatting { classification, compositing, interpolation, .. } = scene.splatting;
+    let expected = draw(Backend::Reference, volume, scene);
+    assert!(expected.image.pixels.iter().filter(|pixel| pixel[3] > 0.05).count() > 100, "{compositing:?}");
+    for rasterizer in RASTERIZERS {
+        if (classification, rasterizer) == (Classification::After, Rasterizer::Tiles) {
+            continue;
+        }
+        let splatting = Splatting { rasterizer, ..scene.splatting };
+        let actual = gpu.render_volume(volume.clone(), &Scene { splatting, ..scene.clone() }).unwrap();
+        let what = format!("{classification:?} {compositing:?} {interpolation:?} by {rasterizer:?}");
+        let required = match (classification, rasterizer, compositing) {
+            (_, _, Compositing::Surface) => 40.0,
+            (Classification::After, ..) | (_, Rasterizer::Quads, _) => 60.0,
+            _ => 80.0,
+        };
+        let measured = decibels(rms(&actual.image, &expected.image));
+        println!("{what}: {measured:.1} dB");
+        assert_at_least(measured, required, &what);
+        assert_eq!(actual.stats.counts.voxels_in_range, expected.stats.counts.voxels_in_range, "{what}");
+    }
+}
+
 #[test]
 fn the_gpu_draws_what_the_twin_draws() {
     let gpu = gpu();
     let mut random = Random(52);
-    for compositing in COMPOSITINGS {
-        let (volume, mut scene) = colored(&mut random, DVec3::ONE);
-        scene.splatting.compositing = compositing;
-        scene.splatting.classification = Classification::Before;
-        let expected = draw(Backend::Reference, &volume, &scene);
-        for rasterizer in RASTERIZERS {
-            scene.splatting.rasterizer = rasterizer;
-            let actual = gpu.render_volume(volume.clone(), &scene).unwrap();
-            let what = format!("{compositing:?} by {rasterizer:?}");
-            let required = match (rasterizer, compositing) {
-                (_, Compositing::Surface) => 40.0,
-                (Rasterizer::Quads, _) => 60.0,
-                _ => 80.0,
-            };
-            assert_at_least(decibels(rms(&actual.image, &expected.image)), required, &what);
-            assert_eq!(actual.stats.counts.voxels_in_range, expected.stats.counts.voxels_in_range, "{what}");
+    for (classification, compositing) in
+        CLASSIFICATIONS.into_iter().flat_map(|c| COMPOSITINGS.map(|compositing| (c, compositing)))
+    {
+        for interpolation in [Interpolation::Smooth, Interpolation::Exact] {
+            if interpolation == Interpolation::Exact && classification == Classification::Before {
+                continue;
+            }
+            let (volume, mut scene) = colored(&mut random, DVec3::new(1.0, 1.2, 0.9));
+            scene.splatting = Splatting { classification, compositing, interpolation, ..scene.splatting };
+            assert_is_the_twins(&gpu, &volume, &scene);
         }
     }
     let (volume, mut scene) = colored(&mut random, DVec3::ONE);
-    scene.splatting.classification = Classification::After;
+    (scene.splatting.classification, scene.splatting.rasterizer) = (Classification::After, Rasterizer::Tiles);
     let message = gpu.render_volume(volume, &scene).unwrap_err().to_string();
-    assert!(message.starts_with("splatting.classification: found \"after\" for a volume of colours"), "{message}");
+    assert!(message.contains("found \"tiles\" with splatting.classification = \"after\" and a volume of"), "{message}");
+}
+
+/// Colours in the second and fourth of four channels.
+#[test]
+fn the_gpu_draws_colours_of_any_channel() {
+    let gpu = gpu();
+    let mut random = Random(56);
+    for (round, (classification, compositing)) in
+        CLASSIFICATIONS.into_iter().flat_map(|c| COMPOSITINGS.map(|compositing| (c, compositing))).enumerate()
+    {
+        let (first, mut scene) = colored(&mut random, DVec3::ONE);
+        let (second, _) = colored(&mut random, DVec3::ONE);
+        let plain = |from: &Volume, factor: f32| {
+            let values = from.values().iter().map(|value| factor * value).collect();
+            Volume::new("values", from.dims(), DVec3::ONE, values).unwrap()
+        };
+        let channels = vec![first.clone(), plain(&first, 0.8), second.clone()];
+        let volume = plain(&second, 0.9).with_channels("test", channels).unwrap();
+        let faint = |color| transfer(&[(0.0, color)], &[(20.0, 0.0), (140.0, 0.3)]);
+        let own = scene.transfer.clone();
+        let transfers = [faint([0.1, 0.9, 0.2]), own.clone(), faint([0.9, 0.1, 0.8]), own];
+        super::set_transfers(&mut scene, &transfers);
+        scene.splatting = Splatting { classification, compositing, ..scene.splatting };
+        if round % 3 == 2 && classification == Classification::After {
+            scene.splatting.interpolation = Interpolation::Exact;
+        }
+        assert_is_the_twins(&gpu, &volume, &scene);
+    }
 }
 
 #[test]

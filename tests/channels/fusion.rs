@@ -11,7 +11,7 @@ use sheetsplat::volume::Volume;
 use super::common::compare::assert_at_most;
 
 /// Writes a NRRD of a function of the place in space, LPS.
-fn write(path: &Path, dims: UVec3, (origin, steps): (DVec3, [DVec3; 3]), of: impl Fn(DVec3) -> f64) {
+pub(super) fn write(path: &Path, dims: UVec3, (origin, steps): (DVec3, [DVec3; 3]), of: impl Fn(DVec3) -> f64) {
     let vector = |v: DVec3| format!("({},{},{})", v.x, v.y, v.z);
     let header = format!(
         "NRRD0005\ntype: float\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\nspace directions: {} {} {}\n\
@@ -145,14 +145,38 @@ fn picks_name_the_channel() {
 #[test]
 fn the_preset_fusion_shows_both() {
     let folder = tempfile::tempdir().unwrap();
-    let scene = phantom(folder.path(), DVec3::ZERO);
+    let mut scene = phantom(folder.path(), DVec3::ZERO);
+    // A ball with an edge as soft as scanners give, and a glow in its middle.
+    let ball =
+        |place: DVec3| (100.0 + 300.0 * (7.0 - place.distance(DVec3::new(10.0, 12.0, 8.0)))).clamp(-1000.0, 100.0);
+    write(&folder.path().join("ct.nrrd"), UVec3::new(21, 25, 17), (DVec3::ZERO, DVec3::AXES), ball);
+    let steps = DVec3::AXES.map(|axis| axis * 2.0);
+    let glow = |place: DVec3| 8.0 * (-place.distance_squared(DVec3::new(10.0, 12.0, 8.0)) / 12.0).exp();
+    write(&folder.path().join("pet.nrrd"), UVec3::new(11, 13, 9), (DVec3::ZERO, steps), glow);
     let volume = scene.load_volume().unwrap();
     let transfer = scene.resolve(&volume);
-    let [solid, glow] = [&transfer, &transfer.further[0]].map(|of| of.opacity.points().last().unwrap().1);
-    assert!(solid > 0.8 && glow < 0.3, "{solid} {glow}");
     let gray = transfer.color.at(100.0);
     assert!(gray.x == gray.y && gray.y == gray.z && gray.x > 0.5, "{gray}");
-    let image = super::draw(Backend::Cpu, &volume, &scene).image;
-    let has = |is: fn(&&[f32; 4]) -> bool| image.pixels.iter().filter(is).count();
-    assert!(has(|pixel| pixel[0] > pixel[2] + 0.2) > 50 && has(|pixel| pixel[2] > 0.4) > 20);
+    let middle = 48 * 24 + 24;
+    let image = |scene: &Scene| super::draw(Backend::Cpu, &volume, scene).image;
+    let both = image(&scene);
+    let [red, _, blue, _] = both.pixels[middle];
+    assert!(red > 0.25 && red > blue + 0.15, "the glow is seen through the ball: {red} {blue}");
+    let is_gray = |pixel: &&[f32; 4]| pixel[0] > 0.08 && (pixel[0] - pixel[2]).abs() < 0.02;
+    assert!(both.pixels.iter().filter(is_gray).count() > 100, "the ball is seen around it");
+    scene.further[0].visible = false;
+    let ball = image(&scene).pixels;
+    let [red, green, blue, _] = ball[middle];
+    assert!(red == green && green == blue && red > 0.1, "{red} {green} {blue}");
+    // Finer grids let as much through.
+    let opacity = |side: u32| {
+        let ball = |index: u32| {
+            let place = UVec3::new(index % side, index / side % side, index / side / side).as_dvec3() + 0.5;
+            if (place / f64::from(side)).distance(DVec3::splat(0.5)) < 0.4 { 100.0 } else { -1000.0 }
+        };
+        let values = (0..side.pow(3)).map(ball).collect();
+        let volume = Volume::new("ball", UVec3::splat(side), DVec3::splat(64.0 / f64::from(side)), values).unwrap();
+        sheetsplat::appearance::Preset::Fusion.transfer(&volume).opacity.at(100.0) * f64::from(side)
+    };
+    assert_at_most((opacity(32) - opacity(64)).abs(), 1e-9, "opacity times side");
 }

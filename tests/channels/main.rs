@@ -1,6 +1,7 @@
 //! Several channels (SPEC §10): scenes that name them, and images whose sheets are sums over them.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod cases;
 mod colors;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
@@ -9,6 +10,7 @@ mod fusion;
 mod gpu;
 mod images;
 mod scenes;
+mod segmentation;
 mod sums;
 
 use glam::UVec3;

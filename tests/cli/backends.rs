@@ -110,3 +110,61 @@ fn what_a_backend_does_not_draw_is_named() {
         .iter()
         .for_each(|word| assert!(run.stderr.contains(word), "{}", run.stderr));
 }
+
+/// A machine without the loader: an empty file in its place cannot be opened.
+#[cfg(target_os = "linux")]
+#[test]
+fn without_a_loader_the_first_command_draws() {
+    let folder = Folder::new();
+    fs::create_dir(folder.path("no-loader")).unwrap();
+    for name in ["libvulkan.so.1", "libvulkan.so"] {
+        folder.write(&format!("no-loader/{name}"), "");
+    }
+    let library = folder.path("no-loader").into_os_string().into_string().unwrap();
+    let without_loader = |arguments: &str| {
+        let environment = [("LD_LIBRARY_PATH", library.as_str())];
+        let mut command = folder.command(arguments);
+        command.env_remove("WGPU_ADAPTER_NAME").env_remove("SHEETSPLAT_BACKEND").env_remove("SHEETSPLAT_SIMD");
+        let output = command.envs(environment).output().unwrap();
+        (output.status.code(), String::from_utf8(output.stderr).unwrap())
+    };
+    // README's first command.
+    let readme = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("README.md")).unwrap();
+    let command = readme.lines().find_map(|line| line.strip_prefix("cargo run --release -- ")).unwrap();
+    assert!(command.starts_with("render builtin:head -o head.png"), "{command}");
+    let command = command.split('#').next().unwrap().trim_end();
+    let (code, stderr) = without_loader(&format!("{command} --stats stats.json"));
+    assert_eq!(code, Some(0), "{stderr}");
+    let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
+    assert_eq!(stats["backend"], "cpu", "{stats}");
+    let picture = image::open(folder.path("head.png")).unwrap().to_rgba8();
+    assert!(picture.pixels().filter(|pixel| pixel.0[0] > 60).count() > 20_000, "the head is in the picture");
+    // With a driver whose loader is missing nothing else is found, either.
+    let (code, stderr) = without_loader("render builtin:cube:8 -o none.png --backend gpu");
+    assert!(code == Some(1) && stderr.contains("no GPU adapter"), "{stderr}");
+}
+
+/// A store that is read while it is drawn.
+#[test]
+fn instruction_sets_change_no_byte_of_a_stream() {
+    let folder = Folder::new();
+    let ball = crate::streaming::write_ball(&folder);
+    let stated = "--set transfer.opacity=[[0,0],[60,0],[200,0.8]] --set camera.direction=[0.3,1,-0.4] \
+                  --set camera.center=[0,0,0] --set camera.height=230 --set transfer.color=[[0,[1,0.9,0.8]]] --backend cpu";
+    let levels = sheetsplat::cpu::Simd::available();
+    assert!(levels.len() >= 2, "{levels:?}");
+    for classification in ["before", "after"] {
+        let render = format!(
+            "render {ball} {stated} --set splatting.classification={classification} --memory 17MiB --stats stats.json"
+        );
+        for level in &levels {
+            let environment = [("SHEETSPLAT_SIMD", level.name()), ("RAYON_NUM_THREADS", "2")];
+            folder.run_with(&environment, "", &format!("{render} -o {}.npy", level.name())).assert_success();
+            let stats = stats(&folder);
+            assert_eq!((&stats["driver"], &stats["chunks_total"]), (&level.name().into(), &27.into()), "{stats}");
+            let same =
+                folder.read(&format!("{}.npy", level.name())) == folder.read(&format!("{}.npy", levels[0].name()));
+            assert!(same, "{level:?}, {classification}");
+        }
+    }
+}

@@ -90,7 +90,7 @@ fn a_bad_set_is_2() {
 
 #[test]
 fn bad_labels_are_2() {
-    for backend in ["gpu", "reference"] {
+    for backend in ["gpu", "cpu", "reference"] {
         let render = |input: &str, labels: &str, words: &[&str]| {
             let set = format!("--set volume.labels={labels} --backend {backend}");
             assert_fails(2, &format!("render {input} -o out.png {set}"), words);
@@ -149,7 +149,7 @@ fn spacings_out_of_range_are_2() {
 /// Each value is allowed by itself, but together they exceed what floats and memory can hold.
 #[test]
 fn values_beyond_any_renderer_are_2() {
-    for backend in ["gpu", "reference"] {
+    for backend in ["gpu", "cpu", "reference"] {
         let render = |sets: &str, words: &[&str]| {
             let arguments = format!("render good.nrrd -o out.png --backend {backend} {sets}");
             assert_fails(2, &arguments, &[&["good.nrrd"], words].concat());

@@ -43,11 +43,11 @@ fn extremes_agree_with_the_reference() {
         for (classification, required) in [("before", 75.0), ("after", 100.0)] {
             let case = format!("{case} {view} --set splatting.classification={classification}");
             let (.., reference) = folder.pixels(&format!("{case} --backend reference"));
-            for rasterizer in RASTERIZERS {
-                let (.., gpu) = folder.pixels(&format!("{case} {UNCULLED} {rasterizer}"));
-                assert!(gpu.iter().flatten().all(|channel| channel.is_finite()), "{case} {rasterizer}");
-                let decibels = psnr(&gpu, &reference, BLACK, 50);
-                assert_at_least(decibels, required, format_args!("{case} {rasterizer}"));
+            for drawing in DRAWINGS {
+                let (.., drawn) = folder.pixels(&format!("{case} {UNCULLED} {drawing}"));
+                assert!(drawn.iter().flatten().all(|channel| channel.is_finite()), "{case} {drawing}");
+                let decibels = psnr(&drawn, &reference, BLACK, 50);
+                assert_at_least(decibels, required, format_args!("{case} {drawing}"));
             }
         }
     }
@@ -61,10 +61,10 @@ fn minified_volumes_keep_their_opacity() {
     for opacity in [0.01, 0.0001] {
         let render = format!("haze.nrrd --set image={{width=2,height=2}} --set transfer.opacity=[[0,{opacity}]]");
         let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
-        for rasterizer in RASTERIZERS {
-            let (.., gpu) = folder.pixels(&format!("{render} {rasterizer}"));
-            for (gpu, reference) in gpu.iter().flatten().zip(reference.iter().flatten()) {
-                assert_near(*gpu, *reference, 1e-3 * reference, &format!("{opacity} {rasterizer}"));
+        for drawing in DRAWINGS {
+            let (.., drawn) = folder.pixels(&format!("{render} {drawing}"));
+            for (drawn, reference) in drawn.iter().flatten().zip(reference.iter().flatten()) {
+                assert_near(*drawn, *reference, 1e-3 * reference, &format!("{opacity} {drawing}"));
             }
         }
     }
@@ -100,12 +100,14 @@ fn deep_volumes_are_drawn_to_their_end() {
              --set transfer.opacity={opacity} --set splatting.compositing=exponential"
         );
         let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
-        let stats = folder.stats(&format!("{render} {TILES}"));
-        assert_eq!(stats["sections_rasterized"], stats["sections_total"], "{render}");
-        let (.., gpu) = folder.read_npy("stats.npy");
-        for (gpu, reference) in gpu.iter().flatten().zip(reference.iter().flatten()) {
-            assert!(*reference > 0.0, "{render}");
-            assert_near(*gpu, *reference, 1e-5 * reference, &render);
+        for drawing in [TILES, "--backend cpu"] {
+            let stats = folder.stats(&format!("{render} {drawing}"));
+            assert_eq!(stats["sections_rasterized"], stats["sections_total"], "{render} {drawing}");
+            let (.., drawn) = folder.read_npy("stats.npy");
+            for (drawn, reference) in drawn.iter().flatten().zip(reference.iter().flatten()) {
+                assert!(*reference > 0.0, "{render}");
+                assert_near(*drawn, *reference, 1e-5 * reference, &format!("{render} {drawing}"));
+            }
         }
     }
 }
@@ -123,11 +125,11 @@ fn the_smallest_and_the_narrowest() {
         let render = format!("{volume}.nrrd --set image={{width={width},height={height}}} {WHOLE} {before}");
         let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
         assert!(reference.iter().any(|pixel| pixel[0] > 0.0), "{render} is black");
-        for rasterizer in RASTERIZERS {
-            let (found_width, found_height, gpu) = folder.pixels(&format!("{render} {UNCULLED} {rasterizer}"));
+        for drawing in DRAWINGS {
+            let (found_width, found_height, drawn) = folder.pixels(&format!("{render} {UNCULLED} {drawing}"));
             assert_eq!((found_width, found_height), (width, height));
-            for (gpu, reference) in gpu.iter().flatten().zip(reference.iter().flatten()) {
-                assert_near(*gpu, *reference, 5e-5, &format!("{render} {rasterizer}"));
+            for (drawn, reference) in drawn.iter().flatten().zip(reference.iter().flatten()) {
+                assert_near(*drawn, *reference, 5e-5, &format!("{render} {drawing}"));
             }
         }
     }
@@ -137,8 +139,8 @@ fn the_smallest_and_the_narrowest() {
         "transfer.iso_ranges=[[1e30,2e30]]",
         "transfer.opacity=[[0,0]]",
     ] {
-        for rasterizer in RASTERIZERS {
-            let render = format!("ball.nrrd --set image={{width=9,height=7}} --set {sets} {rasterizer}");
+        for drawing in DRAWINGS {
+            let render = format!("ball.nrrd --set image={{width=9,height=7}} --set {sets} {drawing}");
             assert_eq!(folder.pixels(&render).2, [BLACK; 63], "{render}");
         }
     }

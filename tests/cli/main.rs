@@ -5,6 +5,7 @@
 mod annotations;
 mod backends;
 mod bench;
+mod channels;
 #[expect(dead_code, reason = "not every file needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
@@ -170,6 +171,9 @@ const SMALL: &str = "builtin:marschner-lobb:12 --set image.width=27 --set image.
 const QUADS: &str = "--set splatting.rasterizer=quads";
 const TILES: &str = "--set splatting.rasterizer=tiles";
 const RASTERIZERS: [&str; 2] = [QUADS, TILES];
+
+/// Whatever draws, beside the reference backend.
+const DRAWINGS: [&str; 3] = [QUADS, TILES, "--backend cpu"];
 
 /// The reference backend culls nothing.
 const UNCULLED: &str = "--set splatting.culling=false";

@@ -101,6 +101,20 @@ fn verbose_says_what_is_done_and_quiet_no_more_than_errors() {
     assert!(said(&[("RUST_LOG", "info")], " --quiet").contains(info), "RUST_LOG overrules it");
     assert!(!said(&[("RUST_LOG", "error")], " -v").contains(info), "RUST_LOG overrules it");
     assert!(!said(&[], " --quiet").contains("sheetsplat"));
+    // How far the coefficients are, of values and of colours.
+    let exact = "--backend cpu --set splatting.classification=after --set splatting.interpolation=exact -o a.png";
+    let progress = folder.run(&format!("render {SMALL} {exact} -v")).stderr;
+    for percent in [30, 60, 100] {
+        let words = format!("coefficients of splatting.interpolation = \"exact\": {percent} %");
+        assert!(progress.contains(&words), "no {words:?} in\n{progress}");
+    }
+    let colors = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/colors/rgba.nrrd");
+    let progress = folder.run(&format!("render {} {exact} -v", colors.display())).stderr;
+    for percent in [25, 50, 100] {
+        let words = format!("coefficients of the voxels' colours: {percent} %");
+        assert!(progress.contains(&words), "no {words:?} in\n{progress}");
+    }
+    assert!(!folder.run(&format!("render {SMALL} {exact}")).stderr.contains('%'), "standard error is no terminal");
     folder.run("--quiet --verbose adapters").assert_failure(2, &["--quiet", "--verbose"]);
     folder.run("render gone.toml -o out.png --quiet").assert_failure(2, &["gone.toml"]);
 }

@@ -151,10 +151,10 @@ fn stats_count_the_sections_of_the_specification() {
     ] {
         let (sections, sheets) = count_sections(dims, DVec3::from(spacing), DVec3::from(direction), radius, slab_width);
         let expected = [sections, sections, sheets, 60];
-        for rasterizer in RASTERIZERS {
+        for drawing in DRAWINGS {
             let sets = format!(
                 "--set camera.direction={} --set volume.spacing={} --set splatting.radius={radius} \
-                 --set splatting.slab_width={slab_width} {rasterizer}",
+                 --set splatting.slab_width={slab_width} {drawing}",
                 format!("{direction:?}").replace(' ', ""),
                 format!("{spacing:?}").replace(' ', ""),
             );

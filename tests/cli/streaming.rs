@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 use crate::*;
 
 /// A file of bytes without a header, of a solid ball: 18 MiB as numbers of 4 bytes.
-fn write_ball(folder: &Folder) -> &'static str {
+pub(crate) fn write_ball(folder: &Folder) -> &'static str {
     let [nx, ny, nz] = [192_u32, 160, 155];
     let value = |[x, y, z]: [u32; 3]| {
         let [x, y, z] = [(x, nx), (y, ny), (z, nz)].map(|(at, count)| f64::from(at) / f64::from(count - 1) - 0.5);

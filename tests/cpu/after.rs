@@ -1,4 +1,4 @@
-//! Classification after splatting (SPEC §9): whole frames against the f64 twin, the same bytes with any number of threads, culling, counts.
+//! Classification after splatting (SPEC §9): whole frames against the f64 twin, culling, counts.
 
 use std::collections::BTreeMap;
 
@@ -13,7 +13,8 @@ use sheetsplat::volume::{Labels, Volume};
 
 use crate::common::images::largest_difference;
 use crate::common::{BY_AMOUNTS, BY_MEANS, Random, SPACINGS, camera};
-use crate::{ROUNDING, bits, draw, head, psnr, random_case, shown, twin};
+use crate::same_bytes::bits;
+use crate::{ROUNDING, draw, head, psnr, random_case, shown, twin};
 
 /// PSNR that SPEC §12 asks for, dB, by gradient.
 fn required(scene: &Scene) -> f64 {
@@ -27,7 +28,7 @@ fn after() -> (Volume, Scene) {
 }
 
 /// Any view of any settings that are drawn after splatting.
-fn random_after(random: &mut Random) -> (Volume, Scene) {
+pub(crate) fn random_after(random: &mut Random) -> (Volume, Scene) {
     let (volume, mut scene) = random_case(random);
     let splatting = &mut scene.splatting;
     splatting.classification = Classification::After;
@@ -270,20 +271,6 @@ fn holes_and_labels_against_the_twin() {
     let expected = twin(&segmented, &scene);
     assert!(psnr(&expected, &twin(&volume, &scene)) < 40.0, "labels show");
     assert!(psnr(&draw(&segmented, &scene).image, &expected) > 60.0);
-}
-
-#[test]
-fn threads_change_no_bit() {
-    let mut random = Random(4);
-    let pools = [1, 2, 3, 7].map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap());
-    for case in 0..10 {
-        let (volume, scene) = random_after(&mut random);
-        let [one, more @ ..] = pools.each_ref().map(|pool| pool.install(|| draw(&volume, &scene)));
-        for other in more {
-            assert_eq!(bits(&one.image), bits(&other.image), "case {case}");
-            assert_eq!(one.stats.counts, other.stats.counts, "case {case}");
-        }
-    }
 }
 
 #[test]

@@ -13,6 +13,7 @@ mod levels;
 mod modes;
 mod picks;
 mod regions;
+mod same_bytes;
 mod scenes;
 #[cfg(feature = "zarr")]
 mod stores;
@@ -20,16 +21,17 @@ mod streams;
 mod surfaces;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::cpu::{self, CpuRenderer, Simd};
+use sheetsplat::cpu;
 use sheetsplat::headless::Rendering;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Clip, Compositing, Economies, Light, Method, Order, Projection, Ramp};
+use sheetsplat::settings::{Clip, Economies, Light, Method, Order, Projection, Ramp};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::images::largest_difference;
-use common::{BY_AMOUNTS, COMPOSITINGS, Random, SPACINGS, camera, random_eye, random_volume, scene, transfer};
+use common::{BY_AMOUNTS, Random, SPACINGS, camera, random_eye, random_volume, scene, transfer};
+use same_bytes::bits;
 
 /// PSNR that is asked for, dB (SPEC §12 asks for 80).
 pub(crate) const REQUIRED: f64 = 100.0;
@@ -233,59 +235,6 @@ fn holes_and_labels_against_the_twin() {
     };
     scene.transfer.labels.insert(2, label);
     assert!(psnr(&draw(&volume, &scene).image, &twin(&volume, &scene)) > REQUIRED);
-}
-
-#[test]
-fn threads_change_no_bit() {
-    let mut random = Random(3);
-    let pools = [1, 2, 3, 7].map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap());
-    for case in 0..12 {
-        let (volume, scene) = random_case(&mut random);
-        let [one, more @ ..] = pools.each_ref().map(|pool| pool.install(|| draw(&volume, &scene)));
-        for other in more {
-            assert_eq!(bits(&one.image), bits(&other.image), "case {case}");
-            assert_eq!(one.stats.counts, other.stats.counts, "case {case}");
-        }
-    }
-}
-
-#[test]
-fn instruction_sets_change_no_bit() {
-    let levels = Simd::available();
-    println!("{levels:?}");
-    assert!(levels.len() >= 2, "only {levels:?}");
-    let mut random = Random(21);
-    for case in 0..24 {
-        let (volume, mut scene) = random_case(&mut random);
-        if scene.splatting.method != Method::CompositeEverySample {
-            scene.splatting.compositing = COMPOSITINGS[case % COMPOSITINGS.len()];
-        }
-        if scene.splatting.compositing == Compositing::Surface {
-            scene.splatting.order = Order::FrontToBack;
-        }
-        let mut renderer = CpuRenderer::new(volume, &scene).unwrap();
-        let drawn: Vec<_> = levels
-            .iter()
-            .map(|level| {
-                renderer.set_simd(*level).unwrap();
-                let Rendering { image, stats } = renderer.draw().unwrap();
-                assert_eq!(stats.driver, level.name());
-                (bits(&image), stats.counts)
-            })
-            .collect();
-        for (level, other) in levels.iter().zip(&drawn).skip(1) {
-            assert!(*other == drawn[0], "case {case}: {level:?} differs from {:?} with {scene:?}", levels[0]);
-        }
-    }
-    for missing in Simd::ALL.into_iter().filter(|level| !levels.contains(level)) {
-        let (volume, scene) = head();
-        let message = CpuRenderer::new(volume, &scene).unwrap().set_simd(missing).unwrap_err().to_string();
-        assert!(message.contains("SHEETSPLAT_SIMD") && message.contains(missing.name()), "{message}");
-    }
-}
-
-fn bits(image: &Image) -> Vec<u32> {
-    image.pixels.as_flattened().iter().map(|channel| channel.to_bits()).collect()
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Compositing by means (`settings::Compositing`), by sheets and by slices, with first hits, against the twin.
+//! Compositing by means (`settings::Compositing`), by sheets and by slices, with first hits and a host's surfaces, against the twin.
 
 use glam::DVec3;
 use sheetsplat::cpu::CpuRenderer;
@@ -9,16 +9,16 @@ use sheetsplat::volume::Volume;
 
 use crate::common::compare::assert_at_most;
 use crate::common::{BY_MEANS, COMPOSITINGS, Random, transfer};
-use crate::{head, psnr, random_case, shown, twin};
+use crate::{head, psnr, random_case, shown, surfaces, twin};
 
 /// Where an opacity, a slab's middle or a ray is on an edge, rounding may decide otherwise: in this share of the pixels.
-const OUTLIERS: f64 = 0.0005;
+pub(crate) const OUTLIERS: f64 = 0.0005;
 
 /// What channels may differ by elsewhere.
 const TOLERANCE: f32 = 1e-4;
 
 /// The share of pixels with a channel that differs by more than the tolerance.
-fn share_off(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
+pub(crate) fn share_off(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
     assert_eq!(a.len(), b.len());
     // NaN is close to nothing.
     let is_close = |(a, b): (&f32, &f32)| (a - b).abs() <= TOLERANCE;
@@ -56,17 +56,22 @@ fn any_view_is_that_of_the_twin() {
             if compositing == Compositing::Surface || first_hit.is_some() {
                 scene.splatting.order = Order::FrontToBack;
             }
-            let host = Host { first_hit, ..Host::default() };
+            let surfaces = (case % 3 == 0).then(|| surfaces::depths(&mut random, &volume, &scene));
+            let unit = volume.grid().unit();
+            let in_units =
+                surfaces.as_ref().map(|depths| depths.iter().map(|&depth| f64::from(depth) / unit).collect());
+            let in_units: Option<Vec<f64>> = in_units;
+            let host = Host { first_hit, surfaces: in_units.as_deref() };
             let expected =
                 reference::render_for(host, &volume, &scene.transfer.resolve(&volume), &scene, None).unwrap();
             shows += usize::from(shown(&expected.image) > 0.1);
             let mut renderer = CpuRenderer::new(volume.clone(), &scene).unwrap();
+            renderer.set_surfaces(surfaces).unwrap();
             renderer.set_first_hit(first_hit).unwrap();
             let image = renderer.draw().unwrap().image;
             let share = share_off(&image.pixels, &expected.image.pixels);
             assert_at_most(share, 8.0 * OUTLIERS, format_args!("case {case}: pixels with {scene:?}"));
             off += share / CASES as f64;
-            let unit = volume.grid().unit();
             let hits = renderer.first_hits().unwrap_or_default().iter().map(|depth| f64::from(*depth) / unit);
             assert_eq!(hits.len(), expected.first_hits.len(), "case {case}");
             for (hit, expected) in hits.zip(&expected.first_hits) {

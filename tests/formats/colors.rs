@@ -10,7 +10,7 @@ use crate::{assert_near, fixture};
 const DIMS: UVec3 = UVec3::new(5, 4, 3);
 
 /// Files, and whether they have A.
-const FILES: [(&str, bool); 13] = [
+const FILES: [(&str, bool); 14] = [
     ("rgb.npy", false),
     ("rgba.npy", true),
     ("rgb.nrrd", false),
@@ -20,6 +20,7 @@ const FILES: [(&str, bool); 13] = [
     ("times.nii", false),
     ("rgb.tif", false),
     ("rgba.tif", true),
+    ("planar.tif", false),
     ("imagej.tif", false),
     ("ome.tif", false),
     ("rgb.dcm", false),

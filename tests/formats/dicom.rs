@@ -66,6 +66,8 @@ fn one_slice_is_as_thick_as_it_says() {
 struct Slice {
     text: Vec<(u16, u16, &'static [u8; 2], String)>,
     numbers: Vec<(u16, u16, u16)>,
+    /// Elements of several numbers in the group of pixels.
+    words: Vec<(u16, Vec<u16>)>,
     samples: Vec<u16>,
 }
 
@@ -98,6 +100,7 @@ impl Slice {
                 (0x28, 0x102, 15),
                 (0x28, 0x103, 0),
             ],
+            words: Vec::new(),
             samples: (0..6).map(|i| 10 * z as u16 + i).collect(),
         };
         slice.with(POSITION, &format!("1\\2\\{z}"))
@@ -117,6 +120,11 @@ impl Slice {
         self
     }
 
+    fn words(mut self, element: u16, words: &[u16]) -> Self {
+        self.words.push((element, words.to_vec()));
+        self
+    }
+
     fn bytes(&self) -> Vec<u8> {
         let element = |group: u16, element: u16, kind: &[u8], value: &[u8]| {
             let length = (value.len() as u16).to_le_bytes();
@@ -129,6 +137,10 @@ impl Slice {
         }
         for &(group, number, value) in &self.numbers {
             bytes.extend(element(group, number, b"US", &value.to_le_bytes()));
+        }
+        for (number, words) in &self.words {
+            let value: Vec<u8> = words.iter().flat_map(|word| word.to_le_bytes()).collect();
+            bytes.extend(element(0x28, *number, b"US", &value));
         }
         bytes.extend([0xe0, 0x7f, 0x10, 0x00, b'O', b'W', 0, 0]);
         bytes.extend((2 * self.samples.len() as u32).to_le_bytes());
@@ -301,6 +313,64 @@ fn mixed_series_are_listed() {
 }
 
 #[test]
+fn indices_have_the_colours_of_their_palette() {
+    // Indices from 10 on, as slices at z = 1 have.
+    let slice = |z: f64, red: &[u16]| {
+        let tables = [(0x1101, 0x1201, red), (0x1102, 0x1202, &[0; 6]), (0x1103, 0x1203, &[65535; 6])];
+        let slice = Slice::at(z).with((0x28, 0x04), "PALETTE COLOR");
+        tables
+            .into_iter()
+            .fold(slice, |slice, (descriptor, table, words)| slice.words(descriptor, &[6, 10, 16]).words(table, words))
+    };
+    let red = [0, 13107, 26214, 39321, 52428, 65535];
+    let volume = series(&[slice(1.0, &red)]).unwrap();
+    assert_eq!(volume.values(), [10.0, 11.0, 12.0, 13.0, 14.0, 15.0]);
+    let expected: Vec<(f64, DVec3)> =
+        (0..6).map(|at| (f64::from(at) + 10.0, DVec3::new(f64::from(at) / 5.0, 0.0, 1.0))).collect();
+    assert_eq!(volume.palette().unwrap(), expected);
+    // Numbers of 8 bits, two in a word or one, and in 16 bits too.
+    let packed = Slice::at(1.0)
+        .with((0x28, 0x04), "PALETTE COLOR")
+        .words(0x1101, &[3, 10, 8])
+        .words(0x1201, &[0x3300, 0x00ff])
+        .words(0x1102, &[3, 10, 8])
+        .words(0x1202, &[0, 0x33, 0xff])
+        .words(0x1103, &[3, 10, 16])
+        .words(0x1203, &[0xff, 0, 0x33]);
+    let volume = series(&[packed]).unwrap();
+    let expected = [(10.0, DVec3::Z), (11.0, DVec3::new(0.2, 0.2, 0.0)), (12.0, DVec3::new(1.0, 1.0, 0.2))];
+    assert_eq!(volume.palette().unwrap(), expected);
+    // Slices of several palettes have none, and neither have indices that are rescaled.
+    let others = [slice(1.0, &red), slice(2.0, &[7; 6])];
+    assert_eq!(series(&others).unwrap().palette(), None);
+    assert_eq!(series(&[slice(1.0, &red).with(SLOPE, "2")]).unwrap().palette(), None);
+}
+
+#[test]
+fn luminance_and_differences_become_colours() {
+    for name in ["colors/rgb.dcm", "colors/planar.dcm", "colors/rle.dcm"] {
+        let stored = Volume::open(&fixture(name)).unwrap();
+        let volume = Folder::new().open("a.dcm", &replaced(name, "CS\x04\0RGB ", "CS\x08\0YBR_FULL")).unwrap();
+        let mut clamped = 0;
+        for index in 0..60 {
+            let [y, blue, red, _] = (stored.color(index).unwrap() * 255.0).to_array();
+            let (blue, red) = (blue - 128.0, red - 128.0);
+            // ITU-R BT.601.
+            let exact = DVec3::new(y + 1.402 * red, y - 0.344136 * blue - 0.714136 * red, y + 1.772 * blue);
+            let found = volume.color(index).unwrap().truncate() * 255.0;
+            let expected = exact.clamp(DVec3::ZERO, DVec3::splat(255.0));
+            assert!(found.abs_diff_eq(expected, 0.5 + 1e-9), "{name} {index}: {found}, not {exact}");
+            clamped += usize::from(exact != expected);
+        }
+        assert!((1..60).contains(&clamped), "{name}: {clamped}");
+    }
+    let half = Folder::new().open("a.dcm", &replaced("colors/rgb.dcm", "CS\x04\0RGB ", "CS\x0c\0YBR_FULL_422"));
+    assert_refused(half, "a.dcm", "PhotometricInterpretation", "YBR_FULL_422", "RGB or YBR_FULL for colours");
+    let jpeg = Folder::new().open("a.dcm", &replaced("colors/jpeg.dcm", "CS\x08\0YBR_FULL", "CS\x04\0RGB "));
+    assert_refused(jpeg, "a.dcm", "PhotometricInterpretation", "RGB", "YBR_FULL or YBR_FULL_422 for colours");
+}
+
+#[test]
 fn wrong_elements() {
     let refused = |slice: Slice, field: &str, found: &str, allowed: &str| {
         assert_refused(Folder::new().open("a.dcm", &slice.bytes()), "a.dcm", field, found, allowed);
@@ -321,8 +391,17 @@ fn wrong_elements() {
     refused(slice().with(FRAME_COUNT, "0"), "NumberOfFrames", "0", "a positive integer");
     refused(slice().with(FRAME_COUNT, "3"), "PixelData", "12 bytes", "36 bytes (3 frames of 3 × 2 uint16)");
     refused(slice().number(0x28, 0x02, 2), "SamplesPerPixel", "2", "1 or 3");
-    refused(slice().number(0x28, 0x02, 3), "PhotometricInterpretation", "MONOCHROME2", "RGB for colours");
-    refused(slice().with((0x28, 0x04), "PALETTE COLOR"), "PhotometricInterpretation", "PALETTE", "MONOCHROME1");
+    refused(slice().number(0x28, 0x02, 3), "PhotometricInterpretation", "MONOCHROME2", "RGB or YBR_FULL for colours");
+    let indices = slice().with((0x28, 0x04), "PALETTE COLOR");
+    refused(indices.clone(), "RedPaletteColorLookupTableDescriptor", "no such element", "8 or 16 bits");
+    let table = "RedPaletteColorLookupTableDescriptor";
+    refused(indices.clone().words(0x1101, &[0, 0, 16]), table, "[0, 0, 16]", "at most 2048 colours");
+    refused(indices.clone().words(0x1101, &[6, 0, 12]), table, "[6, 0, 12]", "8 or 16 bits");
+    let stated = indices.words(0x1101, &[6, 0, 16]);
+    refused(stated.clone(), "RedPaletteColorLookupTableData", "no such element", "6 numbers of 16 bits");
+    refused(stated.clone().words(0x1201, &[1; 5]), "RedPaletteColorLookupTableData", "10 bytes", "6 numbers");
+    let other = stated.words(0x1201, &[1; 6]).words(0x1102, &[5, 0, 16]);
+    refused(other, "GreenPaletteColorLookupTableDescriptor", "[5, 0, 16]", "as for red");
     refused(slice().number(0x28, 0x10, 0), "Rows", "0", "at least 1");
     refused(slice().number(0x28, 0x10, 3), "PixelData", "12 bytes", "18 bytes");
     refused(slice().number(0x28, 0x10, 1), "PixelData", "12 bytes", "6 bytes");

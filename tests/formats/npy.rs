@@ -1,6 +1,6 @@
 //! NPY, as NumPy writes it.
 
-use sheetsplat::volume::Labels;
+use sheetsplat::volume::{Labels, ReadOptions};
 
 use crate::*;
 
@@ -26,6 +26,55 @@ fn labels() {
     let labels = Labels::open(&fixture("fortran-big.npy")).unwrap();
     assert_eq!(labels.spacing, None);
     assert!(labels.values.iter().map(|&label| f32::from(label)).eq(values()));
+}
+
+/// Numbers indexed by an array's axes, in Fortran order: the first axis changes first.
+fn fortran(shape: &[usize], of: impl Fn(&[usize]) -> i16) -> Vec<u8> {
+    let sides: String = shape.iter().map(|side| format!("{side}, ")).collect();
+    let header = format!("{{'descr': '<i2', 'fortran_order': True, 'shape': ({sides}), }}\n");
+    let mut bytes = [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header.as_bytes()].concat();
+    for mut at in 0..shape.iter().product() {
+        let place: Vec<usize> = shape
+            .iter()
+            .map(|side| {
+                let along = at % side;
+                at /= side;
+                along
+            })
+            .collect();
+        bytes.extend(of(&place).to_le_bytes());
+    }
+    bytes
+}
+
+#[test]
+fn channels_times_and_colours_in_fortran_order() {
+    let folder = Folder::new();
+    let value = |z: usize, y: usize, x: usize| (x + 10 * y + 100 * z) as i16;
+    let path = folder.0.path().join("a.npy");
+    let of = |channel: f32, time: f32| values().iter().map(|value| value + 1000.0 * channel + 10000.0 * time).collect();
+    fs::write(&path, fortran(&[2, 3, 4, 5], |at| value(at[1], at[2], at[3]) + 1000 * at[0] as i16)).unwrap();
+    let volume = Volume::open(&path).unwrap();
+    let [first, second]: [Vec<f32>; 2] = [of(0.0, 0.0), of(1.0, 0.0)];
+    assert_eq!((volume.values(), volume.channel(1).unwrap().values()), (first.as_slice(), second.as_slice()));
+    let times = fortran(&[3, 2, 3, 4, 5], |at| value(at[2], at[3], at[4]) + 1000 * at[1] as i16 + 10000 * at[0] as i16);
+    fs::write(&path, times).unwrap();
+    for (channel, time) in (0..2).flat_map(|channel| (0..3).map(move |time| (channel, time))) {
+        let options = ReadOptions::default().with_channel(channel).with_time(time);
+        let volume = Volume::open_with(&path, &options).unwrap();
+        let expected: Vec<f32> = of(channel as f32, time as f32);
+        assert_eq!(volume.values(), expected, "{channel} {time}");
+        assert_eq!((volume.encoding().unwrap().channels, volume.encoding().unwrap().times), (2, 3));
+    }
+    // Signed colours have the largest positive number for 1.
+    fs::write(&path, fortran(&[3, 4, 5, 3], |at| 100 * value(at[0], at[1], at[2]) + at[3] as i16)).unwrap();
+    let colors = Volume::open(&path).unwrap();
+    for index in 0..60 {
+        let voxel = colors.grid().voxel_at(index);
+        let red = f64::from(100 * (voxel.x + 10 * voxel.y + 100 * voxel.z));
+        let found = colors.color(index).unwrap().truncate() * 32767.0;
+        assert!(found.abs_diff_eq(DVec3::new(red, red + 1.0, red + 2.0), 0.6), "{voxel}: {found}");
+    }
 }
 
 /// An invalid label is named by its voxel, in either order.

@@ -178,3 +178,48 @@ fn damaged_displays_are_left_out() {
     assert!(volume.channels().all(|channel| channel.display().is_none()));
     assert!(warnings.iter().any(|warning| warning.contains("IJMetadata is damaged")), "{warnings:?}");
 }
+
+/// An OME-TIFF file whose pages are described by other elements `TiffData`, which take the place of the first channel's description.
+fn with_pages(name: &str, tiff_data: &str) -> Vec<u8> {
+    let mut bytes = std::fs::read(path(name)).unwrap();
+    let find = |text: &str, from: usize| {
+        from + bytes[from..].windows(text.len()).position(|window| window == text.as_bytes()).unwrap()
+    };
+    let start = find("<Channel", 0);
+    let end = find("/>", find("<TiffData", start)) + 2;
+    let text = format!("{tiff_data}{}", "\n".repeat(end - start - tiff_data.len()));
+    bytes[start..end].copy_from_slice(text.as_bytes());
+    bytes
+}
+
+#[test]
+fn pages_come_in_the_order_that_the_description_says() {
+    let folder = Folder::new();
+    // The second half of the pages shows the first half of the blocks of three slices, of which channels change first.
+    let halves = "<TiffData IFD=\"9\" PlaneCount=\"9\"/><TiffData FirstC=\"1\" FirstT=\"1\" PlaneCount=\"9\"/>";
+    let file = folder.0.path().join("a.tif");
+    std::fs::write(&file, with_pages("ome-tczyx.tif", halves)).unwrap();
+    for (channel, time) in (0..2).flat_map(|channel| (0..3).map(move |time| (channel, time))) {
+        let options = ReadOptions::default().with_channel(channel).with_time(time);
+        let volume = Volume::open_with(&file, &options).unwrap();
+        let block = (channel + 2 * time + 3) % 6;
+        assert_eq!(volume.values(), values_of(block % 2, block / 2), "{channel} {time}");
+    }
+    // Slices upside down.
+    let turned =
+        "<TiffData IFD=\"0\" FirstZ=\"2\"/><TiffData IFD=\"1\" FirstZ=\"1\"/><TiffData IFD=\"2\" FirstZ=\"0\"/>";
+    std::fs::write(&file, with_pages("ome-tczyx.tif", turned)).unwrap();
+    let volume = Volume::open(&file).unwrap();
+    let slices: Vec<f32> = values().chunks(20).rev().flatten().copied().collect();
+    assert_eq!(volume.values(), slices);
+    assert_eq!(volume.channel(1).unwrap().values(), values_of(1, 0));
+    for (tiff_data, field, found) in [
+        ("<TiffData IFD=\"0\" FirstZ=\"3\"/>", "FirstZ, FirstC, FirstT", "3, 0, 0"),
+        ("<TiffData IFD=\"0\" FirstC=\"2\"/>", "FirstZ, FirstC, FirstT", "0, 2, 0"),
+        ("<TiffData IFD=\"x\"/>", "IFD", "x"),
+        ("<TiffData IFD=\"0\" FirstZ=\"1\"/>", "TiffData", "a slice that is missing or comes twice"),
+    ] {
+        let result = folder.open("b.tif", &with_pages("ome-tczyx.tif", tiff_data));
+        assert_refused(result, "b.tif", field, found, "");
+    }
+}

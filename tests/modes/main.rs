@@ -1,4 +1,4 @@
-//! Compositing by means (`splatting::Compositing`; SPEC is silent): whole frames by each rasterizer against the f64 evaluation, and
+//! Compositing by means (`splatting::Compositing`; SPEC is silent): whole frames by each rasterizer and the native backend against the f64 evaluation, and
 //! properties of maximum, minimum, average and surface in every view. `cargo test --release --test modes -- --nocapture` prints the
 //! measurements.
 #![expect(clippy::unwrap_used, reason = "tests")]
@@ -12,14 +12,17 @@ mod surface;
 mod twin;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::headless::GpuHeadless;
+use sheetsplat::Pick;
+use sheetsplat::cpu::CpuRenderer;
+use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::Method;
+use sheetsplat::settings::{Method, Splatting};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::Volume;
 
+use common::surfaces::{DepthRange, surfaces};
 use common::{Drawing, Random, SPACINGS, random_eye, random_volume, scene, transfer};
 
 /// The fraction of pixels in which an opacity, a slab's middle or a ray lies on an edge, so that rounding decides.
@@ -72,6 +75,49 @@ pub(crate) fn view_of(volume: &Volume, scene: &Scene) -> ViewGeometry {
 pub(crate) fn render(drawing: Drawing, gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, Counts) {
     let rendering = drawing.render(gpu, volume, scene);
     (rendering.image, rendering.stats.counts)
+}
+
+/// A frame as a host asks for it.
+pub(crate) struct HostFrame {
+    pub(crate) image: Image,
+    /// In `unit`s; empty unless they are asked for.
+    pub(crate) hits: Vec<f64>,
+    /// Of the pixels that are asked for.
+    pub(crate) picks: Vec<Option<Pick>>,
+}
+
+/// Draws a frame with first hits, behind a host's surface at some depths in `unit`s, and picks some pixels.
+pub(crate) fn draw_for_host(
+    drawing: Drawing,
+    gpu: &GpuHeadless,
+    (volume, scene): (&Volume, &Scene),
+    (first_hit, depths): (Option<f64>, Option<&[f64]>),
+    pixels: &[[u32; 2]],
+) -> HostFrame {
+    let unit = volume.grid().unit();
+    let in_units = |depths: &[f32]| depths.iter().map(|&depth| f64::from(depth) / unit).collect();
+    let Drawing::By(rasterizer) = drawing else {
+        let mut renderer = CpuRenderer::new(volume.clone(), scene).unwrap();
+        renderer.set_first_hit(first_hit).unwrap();
+        let in_world = |depths: &[f64]| depths.iter().map(|depth| (depth * unit) as f32).collect();
+        renderer.set_surfaces(depths.map(in_world)).unwrap();
+        let image = renderer.draw().unwrap().image;
+        let picks = pixels.iter().map(|&pixel| renderer.pick(pixel).unwrap()).collect();
+        return HostFrame { image, hits: renderer.first_hits().map_or(Vec::new(), in_units), picks };
+    };
+    let splatting = Splatting { rasterizer, ..scene.splatting };
+    let scene = Scene { splatting, ..scene.clone() };
+    let mut view = gpu.view(volume.clone(), &scene).unwrap();
+    view.set_first_hit(first_hit).unwrap();
+    let seen = view_of(volume, &scene);
+    let given = depths.map(|depths| surfaces(gpu, &seen, unit, DepthRange::Standard, [0.01, 1000.0], depths, [1, 2]));
+    view.set_surfaces(given).unwrap();
+    let image = gpu.draw(&mut view).unwrap().image;
+    let hits = view.first_hits().map_or(Vec::new(), |texture| {
+        let bytes = readback::texture(gpu.device(), gpu.queue(), texture).unwrap();
+        in_units(&bytemuck::pod_collect_to_vec::<_, f32>(&bytes))
+    });
+    HostFrame { image, hits, picks: pixels.iter().map(|&pixel| gpu.pick(&view, pixel).unwrap()).collect() }
 }
 
 /// The constant volume's opacity, and its unshaded colour.

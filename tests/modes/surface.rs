@@ -8,8 +8,8 @@ use sheetsplat::settings::Projection;
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::compare::{self, assert_at_least};
-use crate::common::{DRAWINGS, Drawing, RASTERIZERS, camera, gpu, scene, transfer};
-use crate::{COLOR, constant, render};
+use crate::common::{DRAWINGS, camera, gpu, scene, transfer};
+use crate::{COLOR, HostFrame, constant, draw_for_host, render};
 
 /// A volume with one opacity in one half and 0 in the other, divided by a plane between voxels.
 fn step(opacity: f64) -> (Volume, Scene) {
@@ -27,32 +27,32 @@ fn step(opacity: f64) -> (Volume, Scene) {
 #[test]
 fn the_surface_of_a_step() {
     let gpu = gpu();
-    for (rasterizer, width) in RASTERIZERS.into_iter().flat_map(|r| [0.3, 1.0, 1.6].map(|width| (r, width))) {
+    for (drawing, width) in DRAWINGS.into_iter().flat_map(|drawing| [0.3, 1.0, 1.6].map(|width| (drawing, width))) {
         for projection in [None, Some(Projection::Perspective { fov_y: 12.0, distance: Some(60.0), near: None })] {
             let (volume, mut scene) = step(1.0);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-            (scene.splatting.rasterizer, scene.splatting.slab_width) = (rasterizer, width);
-            let mut view = gpu.view(volume, &scene).unwrap();
-            view.set_first_hit(Some(0.7)).unwrap();
-            let image = gpu.draw(&mut view).unwrap().image;
+            scene.splatting.slab_width = width;
+            let pixels = [[60, 54], [6, 100], [110, 4]];
+            let HostFrame { image, picks, .. } =
+                draw_for_host(drawing, &gpu, (&volume, &scene), (Some(0.7), None), &pixels);
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let color = COLOR.map(|channel| channel as f32);
                 let is_inside = pixel.iter().zip(color).all(|(a, b)| (a - b).abs() < 1e-3);
                 assert!(is_inside && pixel[3] == 1.0, "pixel {at}: {pixel:?} with {scene:?}");
             }
-            for pixel in [[60, 54], [6, 100], [110, 4]] {
-                let pick = gpu.pick(&view, pixel).unwrap().unwrap();
+            for pick in picks {
+                let pick = pick.unwrap();
                 // Between the voxels before and behind it, as exactly as the mean is linear.
-                assert!(pick.position.y.abs() < 0.1 * f64::max(width, 1.0), "{rasterizer:?}, {width}: {pick:?}");
+                assert!(pick.position.y.abs() < 0.1 * f64::max(width, 1.0), "{drawing:?}, {width}: {pick:?}");
             }
             // At a lower opacity the surface lies farther inside.
             let (volume, mut scene) = step(0.6);
-            (scene.splatting.rasterizer, scene.splatting.slab_width) = (rasterizer, width);
-            let image = render(Drawing::By(rasterizer), &gpu, &volume, &scene).0;
+            scene.splatting.slab_width = width;
+            let image = render(drawing, &gpu, &volume, &scene).0;
             assert!(image.pixels.iter().all(|pixel| pixel[3] == 1.0));
             let (volume, mut scene) = step(0.45);
-            (scene.splatting.rasterizer, scene.splatting.slab_width) = (rasterizer, width);
-            let image = render(Drawing::By(rasterizer), &gpu, &volume, &scene).0;
+            scene.splatting.slab_width = width;
+            let image = render(drawing, &gpu, &volume, &scene).0;
             assert!(image.pixels.iter().all(|pixel| *pixel == [0.0; 4]));
         }
     }

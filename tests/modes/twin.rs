@@ -2,18 +2,16 @@
 
 use glam::DVec3;
 use sheetsplat::RenderError;
-use sheetsplat::headless::{GpuHeadless, readback};
-use sheetsplat::image::Image;
+use sheetsplat::cpu::CpuRenderer;
 use sheetsplat::internals::reference::{self, Host};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Compositing, Method, Order};
-use sheetsplat::volume::{Volume, builtin};
+use sheetsplat::volume::builtin;
 
 use crate::common::compare::assert_at_most;
-use crate::common::surfaces::{DepthRange, surfaces};
-use crate::common::{BY_MEANS, DRAWINGS, RASTERIZERS, Random, camera, gpu, scene, transfer};
-use crate::{COLOR, OUTLIERS, constant, random_case, render, share_off, view_of};
+use crate::common::{BY_MEANS, DRAWINGS, Random, camera, gpu, scene, transfer};
+use crate::{COLOR, HostFrame, OUTLIERS, constant, draw_for_host, random_case, render, share_off, view_of};
 
 /// The depths of a host's wall in front of a part of the image.
 fn wall(view: &ViewGeometry) -> Vec<f64> {
@@ -26,32 +24,13 @@ fn wall(view: &ViewGeometry) -> Vec<f64> {
     (0..view.size[0] * view.size[1]).map(depth).collect()
 }
 
-/// Draws a frame, with its first hits in `unit`s if requested.
-fn draw(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, first_hit: Option<f64>, walls: bool) -> (Image, Vec<f64>) {
-    let unit = volume.grid().unit();
-    let mut view = gpu.view(volume.clone(), scene).unwrap();
-    view.set_first_hit(first_hit).unwrap();
-    if walls {
-        let seen = view_of(volume, scene);
-        let depths = wall(&seen);
-        let range = DepthRange::Standard;
-        view.set_surfaces(Some(surfaces(gpu, &seen, unit, range, [0.01, 1000.0], &depths, [1, 2]))).unwrap();
-    }
-    let image = gpu.draw(&mut view).unwrap().image;
-    let hits = view.first_hits().map_or(Vec::new(), |texture| {
-        let bytes = readback::texture(gpu.device(), gpu.queue(), texture).unwrap();
-        bytemuck::pod_collect_to_vec::<_, f32>(&bytes).into_iter().map(|depth| f64::from(depth) / unit).collect()
-    });
-    (image, hits)
-}
-
 #[test]
 fn any_view_equals_the_reference() {
     let gpu = gpu();
     let mut random = Random(2024);
     for compositing in BY_MEANS {
         let mut shown = 0;
-        let mut off = [0.0; 2];
+        let mut off = [0.0; 3];
         const CASES: usize = 16;
         for case in 0..CASES {
             let (volume, mut scene) = random_case(&mut random);
@@ -70,17 +49,13 @@ fn any_view_equals_the_reference() {
                 **pixel == [r * a, g * a, b * a, a].map(|channel| channel as f32)
             });
             shown += usize::from(background.count() + 100 < expected.image.pixels.len());
-            for (rasterizer, off) in RASTERIZERS.into_iter().zip(&mut off) {
-                scene.splatting.rasterizer = rasterizer;
-                let (image, hits) = draw(&gpu, &volume, &scene, first_hit, walls);
+            for (drawing, off) in DRAWINGS.into_iter().zip(&mut off) {
+                let host = (first_hit, depths.as_deref());
+                let HostFrame { image, hits, .. } = draw_for_host(drawing, &gpu, (&volume, &scene), host, &[]);
                 // Quads round amounts to f16.
                 let share = share_off(&image.pixels, &expected.image.pixels, 2e-3);
                 *off += share / CASES as f64;
-                assert_at_most(
-                    share,
-                    8.0 * OUTLIERS,
-                    format_args!("case {case}, {rasterizer:?}: pixels with {scene:?}"),
-                );
+                assert_at_most(share, 8.0 * OUTLIERS, format_args!("case {case}, {drawing:?}: pixels with {scene:?}"));
                 assert_eq!(hits.len(), expected.first_hits.len());
                 let is_close = |(hit, expected): &(&f64, &f64)| {
                     hit == expected || (**hit - **expected).abs() / expected.abs().max(10.0) <= 1e-3
@@ -88,12 +63,12 @@ fn any_view_equals_the_reference() {
                 let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
                 assert!(
                     off <= hits.len() / 100,
-                    "case {case}, {rasterizer:?}: {off} of {} hits with {scene:?}",
+                    "case {case}, {drawing:?}: {off} of {} hits with {scene:?}",
                     hits.len()
                 );
             }
         }
-        println!("{compositing:?}: {off:.5?} of the pixels are off by {RASTERIZERS:?}");
+        println!("{compositing:?}: {off:.5?} of the pixels are off by {DRAWINGS:?}");
         off.into_iter().for_each(|off| assert_at_most(off, OUTLIERS, format_args!("{compositing:?}: pixels")));
         assert!(shown >= CASES / 3, "{compositing:?}: only {shown} cases show much");
     }
@@ -141,17 +116,23 @@ fn settings_that_exclude_each_other_are_refused() {
     let gpu = gpu();
     let volume = builtin::volume("head:24").unwrap();
     let refusal = |scene: &Scene, first_hit: Option<f64>| {
-        let rendered = gpu.view(volume.clone(), scene).and_then(|mut view| {
+        let by_gpu = gpu.view(volume.clone(), scene).and_then(|mut view| {
             view.set_first_hit(first_hit)?;
             gpu.draw(&mut view)
         });
-        match rendered {
+        let natively = CpuRenderer::new(volume.clone(), scene).and_then(|mut renderer| {
+            renderer.set_first_hit(first_hit)?;
+            renderer.draw()
+        });
+        let [by_gpu, natively] = [by_gpu, natively].map(|rendered| match rendered {
             Err(RenderError::OutOfRange(error)) => {
                 assert_eq!(error.key, "splatting.compositing");
                 error.to_string()
             }
             other => panic!("{:?}", other.map(|rendering| rendering.stats)),
-        }
+        });
+        assert_eq!(by_gpu, natively, "both name the same");
+        by_gpu
     };
     let assert_words = |message: &str, words: &[&str]| {
         words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
-use sheetsplat::scene::Scene;
+use sheetsplat::scene::{Channel, Scene, VolumeSource};
 use sheetsplat::settings::{
     Classification, Compositing, Fit, Interpolation, Order, Projection, Ramp, Rasterizer, Region, Splatting, Window,
 };
@@ -120,6 +120,41 @@ fn parts_classified_after_splatting_merge() {
             // Among values that count as equal, as in homogeneous matter, another part's point may be chosen, with another gradient.
             scene.shading.enabled = !matches!(compositing, Compositing::Minimum | Compositing::Maximum);
             compare(Backend::Cpu, &volume, &scene);
+        }
+    }
+}
+
+/// A scene's volume with a second channel of waves, whose colours differ.
+fn with_channel((volume, mut scene): (Arc<Volume>, Scene)) -> (Arc<Volume>, Scene) {
+    let wave = |index: u32| (volume.grid().voxel_at(index).as_dvec3().element_sum() * 0.9).sin() as f32;
+    let waves = (0..volume.dims().element_product()).map(|index| 100.0 + 90.0 * wave(index)).collect();
+    let second = Volume::new("waves", volume.dims(), volume.spacing(), waves).unwrap();
+    let mut channel = Channel::new(VolumeSource::Memory);
+    channel.transfer = scene.transfer.clone();
+    channel.transfer.color = Some(Ramp::new(vec![(0.0, DVec3::X), (200.0, DVec3::Y)]).unwrap());
+    scene.further = vec![channel];
+    (Arc::new(Volume::clone(&volume).with_channels("test", vec![second]).unwrap()), scene)
+}
+
+#[test]
+fn parts_of_several_channels_merge() {
+    use Compositing::{Average, Exponential, Linear, Maximum, Minimum, Surface, Xray};
+    for classification in [Classification::Before, Classification::After] {
+        for compositing in [Linear, Exponential, Xray, Surface, Maximum, Minimum, Average] {
+            let is_joined = matches!(compositing, Maximum | Minimum | Average)
+                || compositing == Surface && classification == Classification::After;
+            for (volume, scene) in scenes(compositing, classification, 24).map(with_channel) {
+                if !is_joined {
+                    compare(Backend::Cpu, &volume, &scene);
+                    continue;
+                }
+                // What is added up after compositing has no parts.
+                let headless = headless(Backend::Cpu);
+                let mut view = headless.view(volume, &scene).unwrap();
+                let window = Window { slabs: 0..2, region: Region { x: 0, y: 0, width: 4, height: 4 } };
+                let message = headless.draw_part(&mut view, &window).unwrap_err().to_string();
+                assert!(message.contains("of several channels for a part of an image"), "{message}");
+            }
         }
     }
 }

@@ -21,7 +21,7 @@ use sheetsplat::volume::{Labels, Volume};
 
 use crate::common::compare::assert_at_most;
 use crate::common::{BY_AMOUNTS, F16, F32, Random, SPACINGS, camera, gpu, random_eye, scene, transfer};
-use crate::cull::Culling;
+use crate::cull::{Culling, Groups};
 
 /// Values of a volume with noise everywhere, so that gradients have all directions.
 fn noise(dims: UVec3, spacing: DVec3) -> Volume {
@@ -137,7 +137,7 @@ fn shaded(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) -> usiz
     let voxels = classify(volume, &transfer, &ClippedVoxels::default());
     let labels = volume.labels().filter(|_| transfer.labels.values().any(LabelTables::matter_to_shading));
     let of_volume = (volume.grid(), volume.values(), labels);
-    let culling = Culling::new(gpu, (&stage, sheets), of_volume, &voxels, &transfer, scene);
+    let culling = Culling::new(gpu, (&stage, Groups::Sheets(sheets)), of_volume, &voxels, &transfer, scene);
     assert!(culling.plan.groups.len() > 1 || culling.view.perspective.is_some(), "{name}: one group");
     (0..culling.plan.groups.len()).for_each(|group| culling.cull(group));
     let (records, states, view) = (culling.splats(), culling.states(), culling.view);

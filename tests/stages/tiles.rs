@@ -6,6 +6,7 @@ use sheetsplat::internals::gpu::layout::{Frame, Indirect, SheetGroup, Tally};
 use sheetsplat::internals::gpu::targets::Targets;
 use sheetsplat::internals::pass::tiles::Tiles;
 use sheetsplat::internals::quad_plan::{TILE, tile_grid};
+use sheetsplat::settings::Order;
 use sheetsplat::wgpu::{BufferUsages, TextureFormat};
 
 use crate::common::{Random, gpu};
@@ -22,7 +23,12 @@ struct Case {
     touched: Vec<bool>,
     /// Whether each tile's pixels are all opaque.
     opaque: Vec<bool>,
+    /// Of groups that are planes (SPEC §9): for every tile the number of the last group with a value in it, or 0, and the order of groups.
+    planes: Option<(Vec<u32>, Order)>,
 }
+
+/// The number of the group that is tested.
+const NUMBER: u32 = 7;
 
 impl Case {
     fn random(random: &mut Random, size: [u32; 2], reach: [u32; 2]) -> Self {
@@ -40,13 +46,22 @@ impl Case {
             tiles: !random.bits().is_multiple_of(4),
             touched,
             opaque,
+            planes: None,
         }
+    }
+
+    /// Whether the plane before has a value in a tile, which then holds for the whole slab.
+    fn is_behind_value(&self, tile: usize) -> bool {
+        self.planes.as_ref().is_some_and(|(last_groups, order)| {
+            let before = if *order == Order::FrontToBack { NUMBER - 1 } else { NUMBER + 1 };
+            last_groups[tile] == before
+        })
     }
 
     fn composited(&self) -> Vec<u32> {
         let is_composited = |tile: &u32| {
             let at = *tile as usize;
-            (!self.tiles || self.touched[at]) && !(self.culling && self.opaque[at])
+            (!self.tiles || self.touched[at] || self.is_behind_value(at)) && !(self.culling && self.opaque[at])
         };
         (0..self.touched.len() as u32).filter(is_composited).collect()
     }
@@ -78,6 +93,10 @@ impl Case {
         let targets = Targets::new(device, self.size, TextureFormat::Rgba32Float, 1).unwrap();
         let opaque: Vec<u32> = self.opaque.iter().map(|&opaque| opaque.into()).collect();
         gpu.queue().write_buffer(&targets.opaque_tiles, 0, bytemuck::cast_slice(&opaque));
+        let order = self.planes.as_ref().map_or(Order::FrontToBack, |(last_groups, order)| {
+            gpu.queue().write_buffer(&targets.last_groups, 0, bytemuck::cast_slice(last_groups));
+            *order
+        });
         let counts: [u32; 8] = [3, 1, 4, 1, 5, 9, 2, 6];
         assert_eq!(size_of_val(&counts), size_of::<Tally>());
         let culled: Vec<u32> = counts.into_iter().chain(self.touched.iter().map(|&touched| touched.into())).collect();
@@ -85,11 +104,13 @@ impl Case {
         let frame = Frame {
             culling: self.culling.into(),
             tiles: self.tiles.into(),
+            order: order as u32,
             ..frame(|scene| (scene.image.width, scene.image.height) = self.size.into())
         };
         let frame = init(device, &[frame], BufferUsages::UNIFORM);
-        let uniforms: Vec<SheetGroup> =
-            (0..GROUPS).map(|index| SheetGroup { box_filter: self.reach, index, ..SheetGroup::zeroed() }).collect();
+        let uniforms: Vec<SheetGroup> = (0..GROUPS)
+            .map(|index| SheetGroup { box_filter: self.reach, index, number: NUMBER, ..SheetGroup::zeroed() })
+            .collect();
         let (groups, stride) = at_offsets(device, &uniforms);
         let lists = stage.prepare(device, [&frame, &groups, &culled], &targets, GROUPS as usize, None).unwrap();
         compute(gpu, |pass| stage.record(pass, &lists, group * stride));
@@ -138,6 +159,27 @@ fn lists_are_those_of_the_rules() {
     assert!(lengths[0] > 1000 && lengths[1] > lengths[0], "{lengths:?}");
 }
 
+/// Groups that are planes are composited where the plane before has a value, too, front to back and back to front.
+#[test]
+fn lists_of_planes_are_those_of_the_rules() {
+    let gpu = gpu();
+    let stage = Tiles::of_planes(gpu.device());
+    let mut random = Random(9);
+    let sizes = [[33, 64], [700, 500], [2000, 20]];
+    let mut behind = 0;
+    for case in 0..24 {
+        let size: [u32; 2] = sizes[case % sizes.len()];
+        let reach = [random.bits() as u32 % 40, 3];
+        let mut case = Case::random(&mut random, size, reach);
+        let order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
+        let last = (0..case.touched.len()).map(|_| random.pick(&[0, NUMBER - 2, NUMBER - 1, NUMBER, NUMBER + 1]));
+        case.planes = Some((last.collect(), order));
+        case.check(&gpu, &stage, random.bits() as u32 % 5);
+        behind += case.composited().iter().filter(|&&tile| case.tiles && !case.touched[tile as usize]).count();
+    }
+    assert!(behind > 100, "{behind}");
+}
+
 /// One tile in the middle: the occlusion buffer changes as far around it as the box reaches, in whole tiles.
 #[test]
 fn margins_are_the_reach_in_whole_tiles() {
@@ -151,7 +193,7 @@ fn margins_are_the_reach_in_whole_tiles() {
         touched[4 * columns + 5] = true;
         let size = [columns as u32 * TILE - 7, rows as u32 * TILE - 1];
         let opaque = vec![false; columns * rows];
-        let case = Case { size, reach, culling: true, tiles: true, touched, opaque };
+        let case = Case { size, reach, culling: true, tiles: true, touched, opaque, planes: None };
         let expected: Vec<u32> = (0..(columns * rows) as u32)
             .filter(|tile| {
                 let reaches = |at: u32, other: u32, margin: u32| (other.saturating_sub(margin)..=other).contains(&at);

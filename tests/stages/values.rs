@@ -3,7 +3,8 @@
 use glam::{DVec3, UVec3};
 use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::layout::Frame;
-use sheetsplat::internals::gpu::uniforms::{self, Ramps};
+use sheetsplat::internals::gpu::ramps::Ramps;
+use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::gpu::volume_texture::{SIDES, ValueFormat, VolumeTexture};
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::view_geometry::ViewGeometry;

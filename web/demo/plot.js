@@ -31,11 +31,22 @@ export class Plot {
         });
     }
 
-    /** Shows a channel. While a point has the focus, points keep their places. */
+    /** Shows a channel. */
     show(channel) {
         this.#channel = channel;
         this.#points = channel.opacity.map(([value, opacity]) => [value, opacity]);
         this.#draw();
+    }
+
+    /** Shows a channel's colours, and leaves the points where they are. */
+    recolor(channel) {
+        this.#channel = channel;
+        this.#draw(this.#focused());
+    }
+
+    /** The point that has the focus. */
+    #focused() {
+        return [...this.#svg.querySelectorAll("circle")].indexOf(document.activeElement);
     }
 
     /** Adds a point where the widest gap is. */

@@ -4,9 +4,10 @@ import type { Move } from "./protocol.js";
 
 /** Heights of the picture that a key moves by. */
 const STEP = 0.05;
-/** The zoom factor of a key, and its exponent per pixel of the wheel. */
+/** The zoom factor of a key, and its exponent per pixel of the wheel and of a pinch on a touchpad. */
 const ZOOM = 1.15;
 const WHEEL = 0.0015;
+const PINCH = 0.01;
 
 /** Lets a canvas move a camera; `move` gets what is done, and whether more will follow at once. Returns what ends it. */
 export function control(canvas: HTMLCanvasElement, move: (move: Move, isGoingOn: boolean) => void): () => void {
@@ -28,22 +29,41 @@ export function control(canvas: HTMLCanvasElement, move: (move: Move, isGoingOn:
     canvas.style.touchAction = "none";
 
     listen("contextmenu", (event) => event.preventDefault());
+    /** The grip that the last move ended with, and the frame that has the next one. */
+    let held: [number, number, number] = [0, 0, 1];
+    let pans = false;
+    let frame = 0;
+    // Fingers report one by one, but what they do together is one move.
+    const follow = () => {
+        cancelAnimationFrame(frame);
+        frame = 0;
+        if (down.size === 0) return;
+        const [x, y, apart] = held;
+        held = grip();
+        if (down.size > 2) return;
+        const [newX, newY, newApart] = held;
+        const by: [number, number] = [(newX - x) / height(), (newY - y) / height()];
+        if (by[0] !== 0 || by[1] !== 0) move(pans ? { pan: by } : { orbit: by }, true);
+        if (apart > 0 && newApart > 0 && apart !== newApart) move({ zoom: apart / newApart }, true);
+    };
     listen("pointerdown", (event) => {
+        follow();
         canvas.setPointerCapture(event.pointerId);
         down.set(event.pointerId, [event.clientX, event.clientY]);
+        held = grip();
     });
     listen("pointermove", (event) => {
-        if (!down.has(event.pointerId) || down.size > 2) return;
-        const [x, y, apart] = grip();
+        if (!down.has(event.pointerId)) return;
         down.set(event.pointerId, [event.clientX, event.clientY]);
-        const [newX, newY, newApart] = grip();
-        const by: [number, number] = [(newX - x) / height(), (newY - y) / height()];
-        const pans = down.size === 2 || event.shiftKey || (event.buttons & 1) === 0;
-        if (by[0] !== 0 || by[1] !== 0) move(pans ? { pan: by } : { orbit: by }, true);
-        if (down.size === 2 && apart > 0 && newApart > 0 && apart !== newApart) move({ zoom: apart / newApart }, true);
+        pans = down.size === 2 || event.shiftKey || (event.buttons & 1) === 0;
+        frame ||= requestAnimationFrame(follow);
     });
     const up = (event: PointerEvent) => {
-        if (down.delete(event.pointerId) && down.size === 0) move({ orbit: [0, 0] }, false);
+        if (!down.has(event.pointerId)) return;
+        follow();
+        down.delete(event.pointerId);
+        if (down.size > 0) held = grip();
+        else move({ orbit: [0, 0] }, false);
     };
     listen("pointerup", up);
     listen("pointercancel", up);
@@ -51,7 +71,8 @@ export function control(canvas: HTMLCanvasElement, move: (move: Move, isGoingOn:
     listen("wheel", (event) => {
         event.preventDefault();
         const pixels = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_LINE ? 20 : 1);
-        move({ zoom: Math.exp(pixels * WHEEL) }, true);
+        // Browsers report a pinch on a touchpad as the wheel with Ctrl.
+        move({ zoom: Math.exp(pixels * (event.ctrlKey ? PINCH : WHEEL)) }, true);
         clearTimeout(rest);
         rest = setTimeout(() => move({ zoom: 1 }, false), 250);
     });
@@ -73,6 +94,7 @@ export function control(canvas: HTMLCanvasElement, move: (move: Move, isGoingOn:
     });
     return () => {
         ending.abort();
+        cancelAnimationFrame(frame);
         clearTimeout(rest);
         canvas.style.touchAction = before;
     };

@@ -5,14 +5,14 @@
 //   await view.setScene({ preset: "ct-bone" });
 
 import { control } from "./controls.js";
-import { Remote, type Backend, type Facts, type Given, type Move, type Pick, type Pixels, type Stats } from "./protocol.js";
-import { overrides, sceneText, type SceneObject, type SceneValue } from "./scene.js";
+import { Remote, type Backend, type Camera, type Facts, type Given, type Move, type News, type Pick, type Pixels, type Stats } from "./protocol.js";
+import { overrides, removed, sceneText, type SceneObject, type SceneValue } from "./scene.js";
 
-export type { Backend, Channel, Facts, Pick, Pixels, Stats } from "./protocol.js";
+export type { Backend, Camera, Channel, Facts, Given, Move, Pick, Pixels, Stats } from "./protocol.js";
 export type { SceneObject, SceneValue } from "./scene.js";
 
-/** A file: dropped or chosen, its bytes, or where it lies. */
-export type Source = File | Blob | ArrayBuffer | URL | string;
+/** A file: dropped or chosen, its bytes, where it lies, or its data with a name, which may be a path. */
+export type Source = File | Blob | ArrayBuffer | URL | string | Given;
 
 /** How a view is made. */
 export interface Options {
@@ -24,7 +24,7 @@ export interface Options {
     controls?: boolean;
     /** Whether the picture has the canvas's size on the screen: by default it does. Otherwise its `width` and `height` count. */
     fit?: boolean;
-    /** The folder of the WebAssembly files, if not this script's. */
+    /** The folder of the WebAssembly files, if they do not lie beside this script. */
     base?: URL | string;
 }
 
@@ -39,8 +39,9 @@ export interface LoadOptions {
 
 /** How a scene replaces another one. */
 export interface SceneOptions {
-    /** Settings in place of the scene's, by the keys of scene files: `{ "transfer.colormap": "magma", "channel[1].visible": false }`. */
-    set?: Record<string, SceneValue | undefined>;
+    /** Settings in place of the scene's, by the keys of scene files: `{ "transfer.colormap": "magma", "channel[1].visible": false }`. `null` takes a
+     * setting or a whole table out of the scene, so that the default counts; `undefined` leaves it as it is. */
+    set?: Record<string, SceneValue | null | undefined>;
     /** Whether the camera stays where it is: otherwise the scene's counts. */
     keepCamera?: boolean;
 }
@@ -55,7 +56,7 @@ export interface SheetSplatEvents {
     error: Error;
     /** The GPU's device is lost; another one is being opened. */
     lost: string;
-    /** It draws again. */
+    /** It draws again: by another device, or by the CPU if the backend is `"auto"` and there is no other device. */
     restored: string;
     /** The camera moved. */
     move: undefined;
@@ -63,11 +64,13 @@ export interface SheetSplatEvents {
 
 /** A view of a volume on a canvas. */
 export class SheetSplat extends EventTarget {
-    /** What draws. */
-    readonly backend: "cpu" | "gpu";
-    readonly canvas: HTMLCanvasElement;
+    #backend: "cpu" | "gpu";
+    #canvas: HTMLCanvasElement;
     readonly #remote: Remote;
-    readonly #endings: (() => void)[] = [];
+    readonly #hasControls: boolean;
+    readonly #fits: boolean;
+    /** Ends what listens to the canvas. */
+    #endings: (() => void)[] = [];
     #source: string | undefined;
     #hasVolume = false;
     #moves: Move[] = [];
@@ -91,7 +94,7 @@ export class SheetSplat extends EventTarget {
         const remote = new Remote(new Worker(new URL("./worker.js", import.meta.url), { type: "module" }));
         try {
             const offscreen = canvas.transferControlToOffscreen();
-            const base = new URL(options.base ?? new URL(".", import.meta.url), document.baseURI).href;
+            const base = options.base === undefined ? undefined : new URL(options.base, document.baseURI).href;
             const start = { canvas: offscreen, backend, workers, allAround: controls, size, base };
             const chosen = await remote.call("start", [start], [offscreen]);
             return new SheetSplat(canvas, remote, chosen, controls, fit);
@@ -103,20 +106,34 @@ export class SheetSplat extends EventTarget {
 
     private constructor(canvas: HTMLCanvasElement, remote: Remote, backend: "cpu" | "gpu", controls: boolean, fit: boolean) {
         super();
-        this.canvas = canvas;
-        this.backend = backend;
+        this.#canvas = canvas;
+        this.#backend = backend;
         this.#remote = remote;
-        remote.onevent = (event, message) => {
-            this.#emit(event, message);
-            if (event === "restored") this.#refresh();
-        };
-        if (controls) {
+        [this.#hasControls, this.#fits] = [controls, fit];
+        remote.onevent = (event, message) => this.#heard(event, message);
+        this.#attach();
+    }
+
+    /** What draws. */
+    get backend(): "cpu" | "gpu" {
+        return this.#backend;
+    }
+
+    /** The canvas. If the CPU takes the place of a lost GPU, a copy with the same attributes takes the place of the canvas in the page. */
+    get canvas(): HTMLCanvasElement {
+        return this.#canvas;
+    }
+
+    /** Listens to the canvas. */
+    #attach(): void {
+        const canvas = this.#canvas;
+        if (this.#hasControls) {
             this.#endings.push(control(canvas, (move, isGoingOn) => {
                 this.#isGoingOn = isGoingOn;
                 this.move(move);
             }));
         }
-        if (fit) {
+        if (this.#fits) {
             let last = onScreen(canvas).join();
             const observer = new ResizeObserver(() => {
                 const size = onScreen(canvas);
@@ -127,6 +144,32 @@ export class SheetSplat extends EventTarget {
             observer.observe(canvas);
             this.#endings.push(() => observer.disconnect());
         }
+    }
+
+    /** Does what the worker's news asks for. */
+    #heard(event: News, message: string): void {
+        if (event === "failed") {
+            this.#emit("error", new Error(message));
+        } else if (event === "canvas") {
+            this.#replaceCanvas();
+        } else {
+            this.#emit(event, message);
+            if (event === "restored") this.#refresh();
+        }
+    }
+
+    /** A canvas of WebGPU cannot get the CPU's pictures, so another one takes its place. */
+    #replaceCanvas(): void {
+        const old = this.#canvas;
+        const hadFocus = old === document.activeElement;
+        for (const end of this.#endings.splice(0)) end();
+        this.#canvas = old.cloneNode() as HTMLCanvasElement;
+        this.#backend = "cpu";
+        old.replaceWith(this.#canvas);
+        this.#attach();
+        if (hadFocus) this.#canvas.focus({ preventScroll: true });
+        const offscreen = this.#canvas.transferControlToOffscreen();
+        this.#remote.call("giveCanvas", [offscreen], [offscreen]).catch((error) => this.#emit("error", error));
     }
 
     /** Loads a volume, several files of one (a header and its data, slices, or a scene file with what it names), or a scene file. Draws it. */
@@ -148,7 +191,8 @@ export class SheetSplat extends EventTarget {
     }
 
     async #show(text: string, options: SceneOptions, source: string | undefined, given: Given[] | undefined): Promise<Facts> {
-        const shown = { text, sets: overrides(options.set ?? {}), source, keepCamera: options.keepCamera ?? false };
+        const set = options.set ?? {};
+        const shown = { text, unset: removed(set), sets: overrides(set), source, keepCamera: options.keepCamera ?? false };
         const facts = await this.#remote.call("setScene", [shown, given]);
         if (given) this.#source = source;
         this.#hasVolume = true;
@@ -233,9 +277,15 @@ export class SheetSplat extends EventTarget {
         return await this.#remote.call("scene", []);
     }
 
+    /** Where the camera is. */
+    async camera(): Promise<Camera> {
+        await this.#flush();
+        return await this.#remote.call("camera", []);
+    }
+
     /** Ends the workers, which frees their memory. */
     dispose(): void {
-        for (const end of this.#endings) end();
+        for (const end of this.#endings.splice(0)) end();
         this.#hasVolume = false;
         this.#remote.end();
     }
@@ -270,6 +320,7 @@ function onScreen(canvas: HTMLCanvasElement): [number, number] {
 async function read(source: Source, name: string | undefined): Promise<Given> {
     if (source instanceof File) return { name: name ?? source.name, data: source };
     if (source instanceof Blob || source instanceof ArrayBuffer) return { name: name ?? "volume", data: source };
+    if (typeof source === "object" && "data" in source) return source;
     const url = new URL(source, document.baseURI);
     const response = await fetch(url);
     if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`);

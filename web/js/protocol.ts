@@ -29,6 +29,11 @@ export interface Stats {
 /** A channel of a volume under its scene's transfer function. */
 export interface Channel {
     name: string;
+    visible: boolean;
+    /** The scene's colour map; `null` if it names none. */
+    colormap: string | null;
+    /** Whether the scene states the colours one by one. */
+    hasColors: boolean;
     /** The smallest and the greatest value. */
     range: [number, number];
     /** Counts of values in at most 256 equal intervals of the range. */
@@ -54,7 +59,30 @@ export interface Facts {
     /** The presets that suit the volume. */
     presets: string[];
     colormaps: string[];
+    /** The scene's preset; `null` if it names none. */
+    preset: string | null;
+    slabWidth: number;
+    compositing: string;
+    /** The compositing that the preset, or the lack of one, chooses. */
+    presetCompositing: string;
+    projection: "orthographic" | "perspective";
+    /** `[nx, ny, nz, d]` keeps the points p with `n·p + d ≥ 0`. */
+    planes: [number, number, number, number][];
+    /** The corners of the box that is kept. */
+    crop: [[number, number, number], [number, number, number]] | null;
     channels: Channel[];
+}
+
+/** Where the camera is, in world units from the volume's centre. */
+export interface Camera {
+    /** Into the scene, of length 1. */
+    direction: [number, number, number];
+    up: [number, number, number];
+    /** The point in the middle of the picture about which the camera turns. */
+    center: [number, number, number];
+    /** What the picture shows from its lower to its upper end, at the centre's depth. */
+    height: number;
+    projection: "orthographic" | "perspective";
 }
 
 /** The point that a picture shows at a pixel. */
@@ -93,12 +121,17 @@ export type Move =
 export interface Shown {
     /** The text of a scene file. */
     text: string;
+    /** Keys of the text that do not count. */
+    unset: string[];
     /** `KEY=VALUE`, in place of what the text states. */
     sets: string[];
     /** The volume file, if the text names none. */
     source: string | undefined;
     keepCamera: boolean;
 }
+
+/** A camera and its home as texts of scene files, and what it frames. */
+export type Pose = [camera: string, home: string, object: Float64Array | undefined];
 
 /** How a worker begins. */
 export interface Start {
@@ -109,8 +142,10 @@ export interface Start {
     workers: number;
     allAround: boolean;
     size: [number, number];
-    /** Where the WebAssembly files lie. */
-    base: string;
+    /** Where the WebAssembly files lie, if not beside the worker's script. */
+    base: string | undefined;
+    /** The library for the CPU, if another worker has compiled it. */
+    module?: WebAssembly.Module;
 }
 
 /** The calls that a worker answers: arguments and result of each. */
@@ -126,6 +161,11 @@ export interface Calls {
     pixels: () => Pixels;
     blob: (type: string) => Blob;
     scene: () => string;
+    camera: () => Camera;
+    /** A canvas on which the CPU draws from now on, because the GPU's can no longer be used. */
+    giveCanvas: (canvas: OffscreenCanvas) => void;
+    /** Moves the camera of a worker that helps to where the first worker's is. */
+    setPose: (...pose: Pose) => void;
     shaders: () => Map<string, string>;
     loseDevice: () => void;
 }
@@ -146,8 +186,10 @@ export interface Call {
 export type Answer =
     | { id: number; result: unknown }
     | { id: number; error: string }
-    /** A worker's news: the device is lost, or draws again. */
-    | { event: "lost" | "restored"; message: string };
+    | { event: News; message: string };
+
+/** A worker's news: the device is lost, another canvas is needed so that the CPU can draw, it draws again, or all that failed. */
+export type News = "lost" | "canvas" | "restored" | "failed";
 
 /** Calls to a worker, as promises. */
 export class Remote {
@@ -155,7 +197,7 @@ export class Remote {
     #next = 0;
     #waiting = new Map<number, { resolve: (result: never) => void; reject: (error: Error) => void }>();
     #dead: Error | undefined;
-    onevent: (event: "lost" | "restored", message: string) => void = () => {};
+    onevent: (event: News, message: string) => void = () => {};
 
     constructor(worker: Worker) {
         this.worker = worker;

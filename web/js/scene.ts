@@ -12,8 +12,13 @@ export function sceneText(scene: string | SceneObject): string {
     return entries(scene).map(([key, value]) => `${key} = ${value}\n`).join("");
 }
 
+/** The keys of settings that are taken out of a scene. */
+export function removed(settings: { [key: string]: SceneValue | null | undefined }): string[] {
+    return Object.entries(settings).filter(([, value]) => value === null).map(([key]) => key);
+}
+
 /** Settings as `KEY=VALUE`. */
-export function overrides(settings: SceneObject): string[] {
+export function overrides(settings: { [key: string]: SceneValue | null | undefined }): string[] {
     const stated = Object.entries(settings).filter(([, value]) => value !== undefined && value !== null);
     return stated.map(([key, value]) => `${key}=${toml(value as SceneValue, key)}`);
 }

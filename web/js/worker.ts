@@ -3,10 +3,13 @@
 
 import type * as Cpu from "./cpu.js";
 import type * as Gpu from "./gpu.js";
-import { Remote, type Answer, type Call, type Calls, type Given, type Region, type Shown, type Start, type Stats } from "./protocol.js";
+import { Shares } from "./shares.js";
+import { Remote, type Answer, type Call, type Calls, type Given, type Pose, type Region, type Shown, type Start, type Stats } from "./protocol.js";
 
-/** Columns of a tile of the native backend; shares of a frame that end between tiles are drawn without waste. */
-const TILE = 32;
+/** How often in turn another device is opened before a frame has been drawn. */
+const MAX_REOPENED = 3;
+/** Milliseconds within which the loss of a device is told after a call failed by it. */
+const LOSS_DELAY = 100;
 
 /** A worker's global scope, of which TypeScript's library for pages knows nothing. */
 interface Scope {
@@ -33,22 +36,29 @@ let context: OffscreenCanvasRenderingContext2D | undefined;
 let size: [number, number] = [1, 1];
 /** Files by their names, as long as the scene may name them. */
 let files = new Map<string, Given["data"]>();
-/** Where shares of a frame begin and end, in shares of its width. */
-let cuts: number[] = [0, 1];
-let lost: Promise<void> | undefined;
+let shares = new Shares(1);
 let shown: Shown | undefined;
+/** Whether the GPU's device is lost, and how many have been. */
+let isLost = false;
+let losses = 0;
+/** How many devices have been opened in place of lost ones since the last frame. */
+let reopened = 0;
+/** Gets the canvas on which the CPU draws in the lost GPU's place. */
+let takeCanvas: ((canvas: OffscreenCanvas) => void) | undefined;
 
-const calls: { [K in keyof Calls]: (...args: Parameters<Calls[K]>) => Promise<ReturnType<Calls[K]>> } = {
+const calls: { [K in Exclude<keyof Calls, "giveCanvas">]: (...args: Parameters<Calls[K]>) => Promise<ReturnType<Calls[K]>> } = {
     async start(options) {
         start = options;
         size = options.size;
         if (options.canvas && options.backend !== "cpu") {
             try {
+                // A canvas that has a context for WebGPU cannot get one for the CPU's pictures, so nothing touches it before a device is open.
                 // Without an adapter there is no need to load the library for it.
                 if (!await (navigator as { gpu?: GpuAccess }).gpu?.requestAdapter()) throw new Error("the browser offers no WebGPU adapter");
                 gpu = await import("./gpu.js");
-                await gpu.default({ module_or_path: new URL("gpu_bg.wasm", options.base) });
-                session = await openGpu();
+                await gpu.default({ module_or_path: wasm("gpu") });
+                session = await gpu.Session.open(options.allAround, options.canvas);
+                session.resize(...size);
                 scope.sheetsplatLost = recover;
                 return "gpu";
             } catch (error) {
@@ -56,20 +66,7 @@ const calls: { [K in keyof Calls]: (...args: Parameters<Calls[K]>) => Promise<Re
                 if (options.backend === "gpu") throw new Error(`backend: found "gpu", allowed: "cpu" in this browser: ${reason(error)}`);
             }
         }
-        cpu = await import("./cpu.js");
-        await cpu.default({ module_or_path: new URL("cpu_bg.wasm", options.base) });
-        session = new cpu.Session(start.allAround);
-        session.resize(...size);
-        if (options.canvas) {
-            context = options.canvas.getContext("2d") ?? undefined;
-            if (!context) throw new Error("the canvas has a context of another kind already");
-        }
-        const count = options.canvas ? options.workers : 1;
-        helpers = Array.from({ length: count - 1 }, () => {
-            return new Remote(new Worker(new URL("./worker.js", import.meta.url), { type: "module" }));
-        });
-        cuts = Array.from({ length: count + 1 }, (_, at) => at / count);
-        await broadcast("start", [{ ...options, canvas: undefined, backend: "cpu" }]);
+        await startCpu();
         return "cpu";
     },
 
@@ -106,7 +103,6 @@ const calls: { [K in keyof Calls]: (...args: Parameters<Calls[K]>) => Promise<Re
     },
 
     async draw(coarse) {
-        await lost;
         return await draw(coarse);
     },
 
@@ -116,7 +112,6 @@ const calls: { [K in keyof Calls]: (...args: Parameters<Calls[K]>) => Promise<Re
     },
 
     async pick(x, y) {
-        await lost;
         session.resize(...size);
         return await session.pick(x, y);
     },
@@ -129,7 +124,6 @@ const calls: { [K in keyof Calls]: (...args: Parameters<Calls[K]>) => Promise<Re
     },
 
     async blob(type) {
-        await lost;
         if (!gpu) {
             await draw(1);
             return await start.canvas!.convertToBlob({ type });
@@ -147,6 +141,15 @@ const calls: { [K in keyof Calls]: (...args: Parameters<Calls[K]>) => Promise<Re
         return session.scene();
     },
 
+    async camera() {
+        session.resize(...size);
+        return session.camera();
+    },
+
+    async setPose(...pose) {
+        ofCpu().setPose(...pose);
+    },
+
     async shaders() {
         return (gpu?.shaders() ?? new Map()) as Map<string, string>;
     },
@@ -157,8 +160,9 @@ const calls: { [K in keyof Calls]: (...args: Parameters<Calls[K]>) => Promise<Re
 };
 
 /** Shows a scene in a session, with the volume from the files unless it has that already. */
-async function show(session: Cpu.Session | Gpu.Session, { text, sets, source, keepCamera }: Shown, isNew: boolean): Promise<void> {
-    if (!await session.setScene(text, sets, source, isNew, keepCamera)) return;
+async function show(session: Cpu.Session | Gpu.Session, shown: Shown, isNew: boolean): Promise<void> {
+    const { text, unset, sets, source, keepCamera } = shown;
+    if (!await session.setScene(text, unset, sets, source, isNew, keepCamera)) return;
     const bytes = new Map<string, Uint8Array>();
     for (const [name, data] of files) {
         bytes.set(name, new Uint8Array(data instanceof Blob ? await data.arrayBuffer() : data));
@@ -166,10 +170,41 @@ async function show(session: Cpu.Session | Gpu.Session, { text, sets, source, ke
     await session.load(bytes);
 }
 
-async function openGpu(): Promise<Gpu.Session> {
-    const made = await gpu!.Session.open(start.allAround, start.canvas!);
-    made.resize(...size);
-    return made;
+/** Where a library's code lies. Bundlers recognize addresses that are written like these. */
+function wasm(backend: "cpu" | "gpu"): URL {
+    if (start.base !== undefined) return new URL(`${backend}_bg.wasm`, start.base);
+    return backend === "cpu" ? new URL("./cpu_bg.wasm", import.meta.url) : new URL("./gpu_bg.wasm", import.meta.url);
+}
+
+/** Loads what draws on the CPU, and starts the workers that help. */
+async function startCpu(): Promise<void> {
+    const count = start.canvas ? start.workers : 1;
+    // They load their scripts while the library is compiled, once for all of them. The address is this script's own: bundlers refuse a worker that
+    // names its own source.
+    helpers = Array.from({ length: count - 1 }, () => new Remote(new Worker(self.location.href, { type: "module" })));
+    shares = new Shares(count);
+    const compiling = start.module ?? compile(wasm("cpu"));
+    cpu = await import("./cpu.js");
+    const module = await compiling;
+    const others = broadcast("start", [{ ...start, size, module, canvas: undefined, backend: "cpu" }]);
+    // What fails first is told.
+    others.catch(() => {});
+    await cpu.default({ module_or_path: module });
+    session = new cpu.Session(start.allAround);
+    session.resize(...size);
+    if (start.canvas) {
+        context = start.canvas.getContext("2d") ?? undefined;
+        if (!context) throw new Error("the canvas has a context of another kind already");
+    }
+    await others;
+}
+
+/** Compiles a WebAssembly file; while it arrives, if the server states its type. */
+async function compile(url: URL): Promise<WebAssembly.Module> {
+    const response = await fetch(url);
+    if (!response.ok) throw new Error(`${url}: ${response.status} ${response.statusText}`);
+    if (response.headers.get("content-type") === "application/wasm") return await WebAssembly.compileStreaming(response);
+    return await WebAssembly.compile(await response.arrayBuffer());
 }
 
 /** The session, if the CPU draws. */
@@ -193,18 +228,20 @@ async function draw(coarse: number): Promise<Stats> {
     const canvas = start.canvas!;
     if (gpu) {
         if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
-        return { ...await (session as Gpu.Session).present() as Stats, workers: 1 };
+        const stats = await (session as Gpu.Session).present() as Stats;
+        reopened = 0;
+        return { ...stats, workers: 1 };
     }
     const began = performance.now();
-    const shares = shared(width, height);
-    const others = shares.slice(1).map((share, at) => helpers[at]!.call("region", [share, coarse, false]));
-    const own = ofCpu().draw(...shares[0]!, false) as Region;
+    const parts = shares.of(width, height);
+    const others = parts.slice(1).map((part, at) => helpers[at]!.call("region", [part, coarse, false]));
+    const own = ofCpu().draw(...parts[0]!, false) as Region;
     const regions = [own, ...await Promise.all(others)];
-    balance(shares, regions, width);
+    shares.balance(parts, regions.map(({ stats }) => stats.frame_ms), width);
     // Changing the size clears the canvas, so it waits for the pixels.
     if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
     regions.forEach(({ rgba }, at) => {
-        const [x, y, columns, rows] = shares[at]!;
+        const [x, y, columns, rows] = parts[at]!;
         context!.putImageData(new ImageData(rgba, columns, rows), x, y);
     });
     const stats = { ...own.stats, width, height, workers: regions.length, frame_ms: performance.now() - began };
@@ -216,47 +253,62 @@ async function draw(coarse: number): Promise<Stats> {
     return stats;
 }
 
-/** A frame's shares: columns of whole tiles, at least one each. */
-function shared(width: number, height: number): [number, number, number, number][] {
-    const tiles = Math.ceil(width / TILE);
-    const count = Math.min(cuts.length - 1, tiles);
-    const ends = Array.from({ length: count + 1 }, (_, at) => {
-        const wanted = Math.round(cuts[Math.round((at * (cuts.length - 1)) / count)]! * tiles);
-        return Math.max(at, Math.min(wanted, tiles - count + at));
-    });
-    return ends.slice(1).map((end, at) => {
-        const first = ends[at]! * TILE;
-        return [first, 0, Math.min(end * TILE, width) - first, height];
-    });
-}
-
-/** Moves the cuts so that all shares of the next frame take the same time, if work is spread evenly within each. */
-function balance(shares: [number, number, number, number][], regions: Region[], width: number): void {
-    if (shares.length < cuts.length - 1) return;
-    const times = regions.map(({ stats }) => Math.max(stats.frame_ms, 0.1));
-    const total = times.reduce((sum, time) => sum + time, 0);
-    const found = [0];
-    let [passed, at] = [0, 0];
-    for (let cut = 1; cut < shares.length; cut++) {
-        const wanted = (total * cut) / shares.length;
-        while (passed + times[at]! < wanted) passed += times[at++]!;
-        const [first, , columns] = shares[at]!;
-        found.push((first + (columns * (wanted - passed)) / times[at]!) / width);
-    }
-    // Half way, since times vary.
-    cuts = [...found, 1].map((cut, at) => (cut + cuts[at]!) / 2);
-}
-
-/** Opens another device after one was lost, and draws again. */
+/** Tells that the device is lost, and opens another one once the current call is done. */
 function recover(message: string): void {
+    losses += 1;
+    isLost = true;
     tell({ event: "lost", message });
-    lost = (async () => {
-        const next = await openGpu();
-        if (shown) await show(next, shown, true);
-        session = next;
-        tell({ event: "restored", message: "" });
-    })();
-    lost.catch((error) => tell({ event: "lost", message: reason(error) }));
+    queue = queue.then(async () => {
+        try {
+            if (isLost) await reopen();
+        } catch (error) {
+            tell({ event: "failed", message: reason(error) });
+        }
+    });
+}
+
+/** Opens another device in place of a lost one, with all that the old one showed. If there is none, the CPU draws from now on, unless WebGPU is
+ * wanted, and then the next call tries again. */
+async function reopen(): Promise<void> {
+    let fault = "it is lost again and again";
+    if (reopened < MAX_REOPENED) {
+        reopened += 1;
+        const seen = losses;
+        try {
+            await (session as Gpu.Session).reopen();
+            if (losses === seen) {
+                isLost = false;
+                tell({ event: "restored", message: "" });
+                return;
+            }
+        } catch (error) {
+            fault = reason(error);
+        }
+    }
+    reopened = 0;
+    if (start.backend !== "auto") {
+        throw new Error(`the GPU's device was lost, and no other one could be opened: ${fault}. The backend "cpu" works without one`);
+    }
+    await fallBack();
+    tell({ event: "restored", message: "" });
+}
+
+/** Lets the CPU draw what the GPU drew, on a canvas of its own. */
+async function fallBack(): Promise<void> {
+    const old = session as Gpu.Session;
+    const pose = old.pose() as Pose | undefined;
+    const given = new Promise<OffscreenCanvas>((resolve) => (takeCanvas = resolve));
+    tell({ event: "canvas", message: "" });
+    start.canvas = await given;
+    await startCpu();
+    old.free();
+    [gpu, isLost] = [undefined, false];
+    if (!shown || !pose) return;
+    const others = broadcast("setScene", [shown, [...files].map(([name, data]) => ({ name, data }))]);
+    await show(session, shown, true);
+    await others;
+    ofCpu().setPose(...pose);
+    await broadcast("setPose", pose);
 }
 
 function tell(answer: Answer, moved: Transferable[] = []): void {
@@ -272,16 +324,36 @@ function reason(error: unknown): string {
     return error instanceof Error ? error.message : String(error);
 }
 
+/** Does what a call asks for; again if that failed because the device was lost. */
+async function done({ name, args }: Call): Promise<unknown> {
+    for (let tries = 1; ; tries++) {
+        if (isLost) await reopen();
+        const seen = losses;
+        try {
+            return await (calls[name as keyof typeof calls] as (...args: unknown[]) => Promise<unknown>)(...args);
+        } catch (error) {
+            if (gpu) await new Promise((resolve) => setTimeout(resolve, LOSS_DELAY));
+            if (losses === seen || tries > MAX_REOPENED) throw error;
+        }
+    }
+}
+
 /** One call at a time, in their order. */
 let queue = Promise.resolve();
 scope.onmessage = ({ data }) => {
-    queue = queue.then(async () => {
-        const { id, name, args } = data;
+    const answer = async () => {
         try {
-            const result = await (calls[name] as (...args: unknown[]) => Promise<unknown>)(...args);
-            tell({ id, result }, name === "region" ? [(result as Region).rgba.buffer] : []);
+            const result = await done(data);
+            tell({ id: data.id, result }, data.name === "region" ? [(result as Region).rgba.buffer] : []);
         } catch (error) {
-            tell({ id, error: reason(error) });
+            tell({ id: data.id, error: reason(error) });
         }
-    });
+    };
+    // The current call waits for the canvas, so that this one cannot wait for the current call.
+    if (data.name === "giveCanvas") {
+        takeCanvas?.(data.args[0] as OffscreenCanvas);
+        tell({ id: data.id, result: undefined });
+        return;
+    }
+    queue = queue.then(answer);
 };

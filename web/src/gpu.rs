@@ -24,9 +24,10 @@ const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 
 /// A device, the canvas, and a view of a volume.
 pub(crate) struct Gpu {
+    instance: Instance,
+    surface: Surface<'static>,
     device: Device,
     queue: Queue,
-    surface: Surface<'static>,
     renderer: Renderer,
     adapter: String,
     view: Option<SceneView>,
@@ -35,26 +36,20 @@ pub(crate) struct Gpu {
 }
 
 impl Gpu {
-    /// Opens the device and compiles what every frame needs.
+    /// Opens a device, compiles what every frame needs, and prepares the canvas.
     pub(crate) async fn open(canvas: web_sys::OffscreenCanvas) -> Result<Self, JsValue> {
         let instance = Instance::new(InstanceDescriptor::new_without_display_handle());
+        let (device, queue, renderer, adapter) = open_device(&instance).await?;
+        // A canvas with a context for WebGPU cannot get one for the CPU's pictures, so this comes last.
         let surface = instance.create_surface(SurfaceTarget::OffscreenCanvas(canvas)).map_err(error)?;
-        let options = RequestAdapterOptions { compatible_surface: Some(&surface), ..Default::default() };
-        let adapter = instance.request_adapter(&options).await.map_err(error)?;
-        let mut descriptor = DeviceDescriptor { label: Some("sheetsplat"), ..DeviceDescriptor::default() };
-        DeviceRequirements::for_adapter(&adapter).merge_into(&mut descriptor);
-        let (device, queue) = adapter.request_device(&descriptor).await.map_err(error)?;
-        device.set_device_lost_callback(|_, message| {
-            // A device that is dropped is lost too; the worker knows that.
-            let lost = js_sys::Reflect::get(&js_sys::global(), &"sheetsplatLost".into());
-            if let Ok(Ok(lost)) = lost.map(JsCast::dyn_into::<js_sys::Function>) {
-                let _ = lost.call1(&JsValue::NULL, &message.into());
-            }
-        });
-        let options = RendererOptions::for_target(FORMAT).with_blend(Blend::Replace);
-        let renderer = scoped(&device, async || Renderer::new(&device, &queue, &options).map_err(error)).await?;
-        let adapter = adapter.get_info().name;
-        Ok(Self { device, queue, surface, renderer, adapter, view: None, configured: None })
+        Ok(Self { instance, surface, device, queue, renderer, adapter, view: None, configured: None })
+    }
+
+    /// Opens another device, which has no volume yet. After an error the old one stays.
+    async fn reopen(&mut self) -> Result<(), JsValue> {
+        (self.device, self.queue, self.renderer, self.adapter) = open_device(&self.instance).await?;
+        (self.view, self.configured) = (None, None);
+        Ok(())
     }
 
     /// Shows a volume; one that is shown already is not uploaded again.
@@ -230,10 +225,33 @@ impl Session {
         Ok(Uint8ClampedArray::from(&bytes[..]))
     }
 
+    /// Opens another device in place of a lost one, with the volume, the scene and the camera of before.
+    pub async fn reopen(&mut self) -> Result<(), JsValue> {
+        self.drawer.reopen().await?;
+        self.show_again().await
+    }
+
     /// Loses the device, for tests.
     pub fn lose(&self) {
         self.drawer.device.destroy();
     }
+}
+
+/// Opens a device whose loss the worker learns, and compiles what every frame needs. The last result is the adapter's name.
+async fn open_device(instance: &Instance) -> Result<(Device, Queue, Renderer, String), JsValue> {
+    let adapter = instance.request_adapter(&RequestAdapterOptions::default()).await.map_err(error)?;
+    let mut descriptor = DeviceDescriptor { label: Some("sheetsplat"), ..DeviceDescriptor::default() };
+    DeviceRequirements::for_adapter(&adapter).merge_into(&mut descriptor);
+    let (device, queue) = adapter.request_device(&descriptor).await.map_err(error)?;
+    device.set_device_lost_callback(|_, message| {
+        let lost = js_sys::Reflect::get(&js_sys::global(), &"sheetsplatLost".into());
+        if let Ok(Ok(lost)) = lost.map(JsCast::dyn_into::<js_sys::Function>) {
+            let _ = lost.call1(&JsValue::NULL, &message.into());
+        }
+    });
+    let options = RendererOptions::for_target(FORMAT).with_blend(Blend::Replace);
+    let renderer = scoped(&device, async || Renderer::new(&device, &queue, &options).map_err(error)).await?;
+    Ok((device, queue, renderer, adapter.get_info().name))
 }
 
 /// Every shader's stage and WGSL, for tests that compile them in a browser.

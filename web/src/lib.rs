@@ -7,6 +7,7 @@ mod facts;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod session;
+mod unset;
 
 #[cfg(not(feature = "gpu"))]
 pub(crate) use cpu::Cpu as Drawer;

@@ -1,9 +1,15 @@
 //! A volume with its scene, and the pictures of it.
 
+use std::cell::OnceCell;
 use std::path::Path;
+use std::rc::Rc;
 use std::sync::Arc;
 
 use glam::DVec2;
+#[cfg(not(feature = "gpu"))]
+use glam::DVec3;
+#[cfg(feature = "gpu")]
+use js_sys::{Array, Float64Array};
 use js_sys::{Map, Uint8Array};
 use serde::Serialize;
 use sheetsplat::scene::{Channel, ImageSettings, VolumeSource};
@@ -13,7 +19,8 @@ use sheetsplat::{Pick, Scene, Volume};
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsCast, JsValue};
 
-use crate::facts::Facts;
+use crate::facts::{Facts, Histogram, Placed};
+use crate::unset::without;
 use crate::{Drawer, error, nothing};
 
 /// A volume, how it is shown, and what draws it. A worker has one; several workers that share a frame get the same calls.
@@ -32,36 +39,45 @@ pub struct Session {
 struct Shown {
     scene: Scene,
     volume: Arc<Volume>,
+    /// Those of the volume's channels, once they are asked for.
+    histograms: Histograms,
     /// The scene's original camera.
     home: Camera,
     /// What a camera that fits the object shows.
     object: Option<Extent>,
 }
 
+type Histograms = Rc<OnceCell<Vec<Histogram>>>;
+
 #[wasm_bindgen]
 impl Session {
-    /// Changes the scene: the text of a scene file with `KEY=VALUE` overrides, for the volume file `source` where the text names none. With
-    /// `keeps_camera` the camera of the same volume stays. Returns whether [`Self::load`] must follow, because the volume is another one.
+    /// Changes the scene: the text of a scene file without the keys `unset` and with `KEY=VALUE` overrides, for the volume file `source` where the
+    /// text names none. With `keeps_camera` the camera of the same volume stays. Returns whether [`Self::load`] must follow, because the volume
+    /// is another one.
     #[wasm_bindgen(js_name = setScene)]
     pub async fn set_scene(
         &mut self,
         text: &str,
+        unset: Vec<String>,
         sets: Vec<String>,
         source: Option<String>,
         is_new: bool,
         keeps_camera: bool,
     ) -> Result<bool, JsValue> {
         let folder = Path::new("");
+        let text = without(text, &unset);
         let scene = match source {
-            Some(name) => Scene::parse_for(VolumeSource::File(name.into()), text, "scene", folder, &sets),
-            None => Scene::parse(text, "scene", folder, &sets),
+            Some(name) => Scene::parse_for(VolumeSource::File(name.into()), &text, "scene", folder, &sets),
+            None => Scene::parse(&text, "scene", folder, &sets),
         };
         let scene = scene.map_err(error)?;
         match &self.shown {
-            Some(Shown { scene: old, volume, home, object, .. }) if !is_new && sources(old) == sources(&scene) => {
+            Some(Shown { scene: old, volume, histograms, home, object })
+                if !is_new && sources(old) == sources(&scene) =>
+            {
                 let kept = keeps_camera.then_some((old.camera, *home, *object));
-                let volume = Arc::clone(volume);
-                self.show(scene, volume, kept).await?;
+                let loaded = (Arc::clone(volume), Rc::clone(histograms));
+                self.show(scene, loaded, kept).await?;
                 Ok(false)
             }
             _ => {
@@ -81,7 +97,7 @@ impl Session {
         let files: Files = given.into_iter().collect();
         let volume = scene.load_volume_with(&ReadOptions::default().with_files(files)).map_err(error)?;
         // The old volume need not fit into memory beside the new one's lists.
-        self.show(scene, Arc::new(volume), None).await
+        self.show(scene, (Arc::new(volume), Histograms::default()), None).await
     }
 
     /// Changes the picture's size in pixels.
@@ -134,13 +150,57 @@ impl Session {
     /// The volume, and how its scene shows it.
     pub fn facts(&self) -> Result<JsValue, JsValue> {
         let shown = self.shown()?;
-        plain(&Facts::new(&shown.volume, &shown.scene))
+        let histograms = shown.histograms.get_or_init(|| shown.volume.channels().map(Histogram::new).collect());
+        plain(&Facts::new(&shown.volume, &shown.scene, histograms))
+    }
+
+    /// Where the camera is.
+    pub fn camera(&self) -> Result<JsValue, JsValue> {
+        let shown = self.shown()?;
+        let scene = shown.camera(self.size).explicit(&shown.volume);
+        plain(&Placed::new(&scene.camera, shown.height(self.size)))
     }
 
     /// The scene as the text of a scene file, with everything stated that depends on the volume.
     pub fn scene(&self) -> Result<String, JsValue> {
         let shown = self.shown()?;
         shown.camera(self.size).explicit(&shown.volume).to_toml(Path::new("")).map_err(error)
+    }
+}
+
+#[cfg(feature = "gpu")]
+#[wasm_bindgen]
+impl Session {
+    /// What [`Self::set_pose`] of a session that takes this one's place needs; `undefined` without a volume.
+    pub fn pose(&self) -> Result<Option<Array>, JsValue> {
+        let Some(Shown { scene, home, object, .. }) = &self.shown else { return Ok(None) };
+        let [camera, home] = [scene.camera, *home].map(|camera| {
+            let scene = Scene { camera, ..Scene::new(VolumeSource::Builtin("cube".to_owned())) };
+            scene.to_toml(Path::new("")).map_err(error)
+        });
+        let object = object.map_or(JsValue::UNDEFINED, |Extent { low, high }| {
+            let corners = [low.to_array(), high.to_array()];
+            Float64Array::from(corners.as_flattened()).into()
+        });
+        Ok(Some(Array::of3(&camera?.into(), &home?.into(), &object)))
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+#[wasm_bindgen]
+impl Session {
+    /// Moves the camera to where another session's is: it and its home as texts of scene files, and the corners of what it frames.
+    #[wasm_bindgen(js_name = setPose)]
+    pub fn set_pose(&mut self, camera: &str, home: &str, object: Option<Vec<f64>>) -> Result<(), JsValue> {
+        let shown = self.shown.as_mut().ok_or_else(nothing)?;
+        let [camera, home] = [camera, home]
+            .map(|text| Scene::parse(text, "scene", Path::new(""), &[]).map(|scene| scene.camera).map_err(error));
+        (shown.scene.camera, shown.home) = (camera?, home?);
+        shown.object = object.filter(|corners| corners.len() == 6).map(|corners| {
+            let [low, high] = [&corners[..3], &corners[3..]].map(DVec3::from_slice);
+            Extent { low, high }
+        });
+        Ok(())
     }
 }
 
@@ -154,7 +214,7 @@ impl Session {
     async fn show(
         &mut self,
         scene: Scene,
-        volume: Arc<Volume>,
+        (volume, histograms): (Arc<Volume>, Histograms),
         kept: Option<(Camera, Camera, Option<Extent>)>,
     ) -> Result<(), JsValue> {
         let [width, height] = self.size;
@@ -164,10 +224,17 @@ impl Session {
             let object = self.all_around.then(|| scene.extent(&volume, &scene.resolve(&volume))).flatten();
             (scene.camera, scene.camera, object)
         });
-        let shown = Shown { home, object, scene: Scene { camera, ..scene }, volume };
+        let shown = Shown { scene: Scene { camera, ..scene }, volume, histograms, home, object };
         self.drawer.set_volume(&shown.volume, &shown.camera(self.size)).await?;
         self.shown = Some(shown);
         Ok(())
+    }
+
+    /// Gives the volume, if there is one, to what draws, which has lost it.
+    #[cfg(feature = "gpu")]
+    pub(crate) async fn show_again(&mut self) -> Result<(), JsValue> {
+        let Some(shown) = &self.shown else { return Ok(()) };
+        self.drawer.set_volume(&shown.volume, &shown.camera(self.size)).await
     }
 
     /// What is drawn now.
@@ -213,16 +280,16 @@ impl Picked {
     }
 }
 
-/// What decides which volume a scene shows.
-fn sources(scene: &Scene) -> Vec<Channel> {
-    let source = |channel: std::borrow::Cow<'_, Channel>| {
+/// What decides which volume a scene shows: its channels' volumes with their numbers, without those that are channels of the first one's volume.
+fn sources(scene: &Scene) -> Vec<(usize, Channel)> {
+    let source = |(number, channel): (usize, std::borrow::Cow<'_, Channel>)| {
         let Channel { volume, spacing, labels, index, time, level, .. } = channel.into_owned();
         let mut source = Channel::new(volume);
         (source.spacing, source.labels) = (spacing, labels);
         (source.index, source.time, source.level) = (index, time, level);
-        source
+        (number == 0 || source.volume != VolumeSource::Memory).then_some((number, source))
     };
-    scene.channels().map(source).collect()
+    scene.channels().enumerate().filter_map(source).collect()
 }
 
 /// Plain data as a JavaScript object.

@@ -8,9 +8,10 @@ import { serve } from "./serve.mjs";
 
 const root = dirname(dirname(dirname(fileURLToPath(import.meta.url))));
 
+/** Pages' pictures have the colours that canvases have. */
+const FLAGS = ["--no-sandbox", "--force-color-profile=srgb"];
 /** Those that give Debian's Chromium WebGPU without a GPU. */
-const FLAGS = [
-    "--no-sandbox",
+const WEBGPU = [
     "--enable-unsafe-webgpu",
     "--ignore-gpu-blocklist",
     "--enable-gpu",
@@ -21,9 +22,10 @@ const FLAGS = [
 ];
 
 /** Opens a browser and a server; `close` ends both. */
-export async function open() {
+export async function open({ hasWebgpu = true } = {}) {
     const { server, url } = await serve();
-    const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args: FLAGS });
+    const args = [...FLAGS, ...(hasWebgpu ? WEBGPU : [])];
+    const browser = await chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", args });
     const close = async () => {
         await browser.close();
         server.closeAllConnections();
@@ -32,14 +34,20 @@ export async function open() {
     return { browser, url, close };
 }
 
-/** A page of the server. What it logs as an error fails the test that calls `check`. */
-export async function page(browser, address, options = {}) {
+/** A page of the server, and what it has logged as errors. `inWorkers` is a script that its workers run first. */
+export async function page(browser, address, { inWorkers, ...options } = {}) {
     const context = await browser.newContext({ viewport: { width: 800, height: 600 }, ...options });
     const opened = await context.newPage();
     const faults = [];
     opened.on("pageerror", (error) => faults.push(String(error)));
     opened.on("console", (message) => message.type() === "error" && faults.push(message.text()));
     opened.on("requestfailed", (request) => faults.push(`${request.url()}: ${request.failure()?.errorText}`));
+    if (inWorkers) {
+        await context.route(/worker[^/]*\.js/, async (route) => {
+            const response = await route.fetch();
+            await route.fulfill({ response, body: `${inWorkers}\n${await response.text()}` });
+        });
+    }
     await opened.goto(address);
     return { page: opened, faults };
 }

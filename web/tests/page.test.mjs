@@ -1,70 +1,21 @@
-// The page as a person uses it, by both backends: a file dropped, an orbit by the mouse, keys, errors, a lost device.
+// The page of web/demo as a person uses it, by both backends: files, controls, downloads, errors.
 import assert from "node:assert/strict";
-import { mkdirSync, readFileSync } from "node:fs";
-import { dirname, join } from "node:path";
+import { readFileSync } from "node:fs";
 import { after, before, test } from "node:test";
-import { fileURLToPath } from "node:url";
-import { open, page } from "./browser.mjs";
+import { decode } from "fast-png";
+import { open } from "./browser.mjs";
+import { SMALL, TINY, camera, colors, demo, drop, fixture, isIdle, picture, sceneHas, text } from "./helpers.mjs";
 
-const here = dirname(fileURLToPath(import.meta.url));
-const fixtures = join(here, "..", "..", "tests", "fixtures");
-/** Pictures to look at, and what a continuous integration keeps. */
-const screenshots = process.env.SCREENSHOTS ?? join(here, "..", "screenshots");
-
-let browser;
-let url;
-let close;
-before(async () => {
-    mkdirSync(screenshots, { recursive: true });
-    ({ browser, url, close } = await open());
-});
-after(() => close());
-
-/** A picture that WebGPU draws soon without a GPU. */
-const SMALL = { viewport: { width: 800, height: 320 } };
-
-async function demo(query, options) {
-    const opened = await page(browser, `${url}demo/?${query}`, options);
-    await opened.page.waitForSelector("html[data-ready]");
-    return opened;
-}
-
-/** Drops files of `tests/fixtures`, or of given bytes, onto the page. */
-async function drop(shown, files) {
-    const given = files.map(({ name, bytes }) => ({ name, data: (bytes ?? readFileSync(join(fixtures, name))).toString("base64") }));
-    const transfer = await shown.evaluateHandle((given) => {
-        const transfer = new DataTransfer();
-        for (const { name, data } of given) {
-            transfer.items.add(new File([Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0))], name));
-        }
-        return transfer;
-    }, given);
-    await shown.dispatchEvent("#stage", "drop", { dataTransfer: transfer });
-    await shown.waitForSelector("#busy", { state: "hidden" });
-}
-
-const text = (shown, selector) => shown.textContent(selector);
-
-/** The number of colours in the picture: one if nothing shows. */
-async function colors(shown) {
-    return await shown.evaluate(async () => {
-        const bitmap = await createImageBitmap(await window.view.toBlob());
-        const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
-        context.drawImage(bitmap, 0, 0);
-        const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
-        return new Set(new Uint32Array(data.buffer)).size;
-    });
-}
+let opened;
+before(async () => (opened = await open()));
+after(() => opened.close());
 
 /** The camera's direction. */
-async function direction(shown) {
-    const scene = await shown.evaluate(() => window.view.scene());
-    return JSON.parse(scene.match(/^direction = (\[.*\])$/m)[1]);
-}
+const direction = async (shown) => (await camera(shown)).direction;
 
-for (const backend of ["cpu", "gpu"]) {
+for (const [backend, size] of [["cpu", SMALL], ["gpu", TINY]]) {
     test(`files dropped on the page are shown (${backend})`, async () => {
-        const { page: shown, faults } = await demo(`backend=${backend}&workers=2`, SMALL);
+        const { page: shown, faults } = await demo(opened, `backend=${backend}&workers=2`, size);
         assert.ok(await shown.isVisible("#hint"));
         for (const { name, others = [], words } of [
             { name: "itk.nrrd", words: /itk\.nrrd: 5 × 4 × 3, NRRD/ },
@@ -83,7 +34,7 @@ for (const backend of ["cpu", "gpu"]) {
     });
 
     test(`the mouse and keys turn and zoom (${backend})`, async () => {
-        const { page: shown, faults } = await demo(`backend=${backend}&example=head:32`, SMALL);
+        const { page: shown, faults } = await demo(opened, `backend=${backend}&example=head:32`, size);
         const before = await direction(shown);
         const scene = await shown.evaluate(() => window.view.scene());
         const box = await shown.locator("#canvas").boundingBox();
@@ -117,8 +68,8 @@ for (const backend of ["cpu", "gpu"]) {
     });
 
     test(`damaged and unknown files are refused by name, and the old volume stays (${backend})`, async () => {
-        const { page: shown } = await demo(`backend=${backend}&workers=2&example=head:24`, SMALL);
-        const whole = readFileSync(join(fixtures, "itk.nrrd"));
+        const { page: shown } = await demo(opened, `backend=${backend}&workers=2&example=head:24`, size);
+        const whole = fixture("itk.nrrd");
         await drop(shown, [{ name: "cut.nrrd", bytes: whole.subarray(0, whole.length - 5) }]);
         assert.match(await text(shown, "#problem"), /^cut\.nrrd: /);
         await drop(shown, [{ name: "letter.txt", bytes: Buffer.from("Dear Sir") }]);
@@ -132,37 +83,15 @@ for (const backend of ["cpu", "gpu"]) {
     });
 }
 
-test("another device takes the place of a lost one", async () => {
-    const { page: shown } = await demo("backend=gpu&example=head:32", SMALL);
-    const before = await shown.evaluate(async () => [...new Uint8Array(await (await window.view.toBlob()).arrayBuffer())]);
-    const events = await shown.evaluate(async () => {
-        const events = [];
-        const restored = new Promise((resolve) => window.view.on("restored", resolve));
-        window.view.on("lost", () => events.push("lost"));
-        await window.view.internals.loseDevice();
-        await restored;
-        events.push("restored");
-        return events;
-    });
-    assert.deepEqual(events, ["lost", "restored"]);
-    const later = await shown.evaluate(async () => [...new Uint8Array(await (await window.view.toBlob()).arrayBuffer())]);
-    assert.ok(await colors(shown) > 100);
-    assert.deepEqual(later, before);
-});
-
-test("every control changes the picture and can be reached by the keyboard", async () => {
-    const { page: shown, faults } = await demo("backend=cpu&workers=2&example=head:48", SMALL);
-    const picture = () => shown.evaluate(async () => {
-        const hash = await crypto.subtle.digest("SHA-256", await (await window.view.toBlob()).arrayBuffer());
-        return [...new Uint8Array(hash)].join();
-    });
-    const seen = new Set([await picture()]);
+test("every control changes the picture, and a saved scene shows it again", async () => {
+    const { page: shown, faults } = await demo(opened, "backend=cpu&workers=2&example=head:48", SMALL);
+    const seen = new Set([await picture(shown)]);
     const changes = async (what, act) => {
         await act();
-        let now = await picture();
+        let now = await picture(shown);
         for (let waited = 0; seen.has(now) && waited < 100; waited++) {
             await shown.waitForTimeout(50);
-            now = await picture();
+            now = await picture(shown);
         }
         assert.ok(await shown.isHidden("#problem"), `${what}: ${await text(shown, "#problem")}`);
         assert.ok(!seen.has(now), `${what} changes nothing`);
@@ -183,142 +112,79 @@ test("every control changes the picture and can be reached by the keyboard", asy
         assert.equal(await shown.locator("#plot circle").count(), points + 1);
         await shown.keyboard.press("Shift+ArrowUp");
     });
-    await changes("a clip plane", () => shown.locator("#clip input").nth(1).fill("0"));
+    await changes("a point that is dragged", async () => {
+        await shown.locator("#plot circle").last().scrollIntoViewIfNeeded();
+        const box = await shown.locator("#plot circle").last().boundingBox();
+        const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+        const label = await shown.locator("#plot circle").last().getAttribute("aria-label");
+        await shown.mouse.move(x, y);
+        await shown.mouse.down();
+        await shown.mouse.move(x - 20, y + 15, { steps: 3 });
+        await shown.mouse.up();
+        assert.notEqual(await shown.locator("#plot circle").last().getAttribute("aria-label"), label);
+    });
+    await changes("a side of the box", () => shown.locator("#crop input").nth(1).fill("0"));
+    await changes("an oblique plane", () => shown.check("#plane"));
     await shown.locator("summary", { hasText: "Splatting" }).click();
     await changes("the slab width", () => shown.locator("#slab-width").fill("2"));
     await changes("a compositing", () => shown.selectOption("#compositing", "maximum"));
     await changes("perspective", () => shown.check("#perspective"));
-    // Everything has a name that a screen reader can say.
-    const nameless = await shown.evaluate(() => {
-        const named = (control) => control.labels?.length || control.getAttribute("aria-label") || control.textContent.trim();
-        return [...document.querySelectorAll("button, select, input, canvas, circle")].filter((control) => !named(control)).map((control) => control.outerHTML);
-    });
-    assert.deepEqual(nameless, []);
     const [saved] = await Promise.all([shown.waitForEvent("download"), shown.click("#save-scene")]);
     assert.equal(saved.suggestedFilename(), "head.toml");
     const scene = readFileSync(await saved.path(), "utf8");
-    for (const words of ['builtin = "head:48"', "slab_width = 2", 'compositing = "maximum"', "crop = "]) {
+    for (const words of ['builtin = "head:48"', "slab_width = 2", 'compositing = "maximum"', "crop = ", "planes = "]) {
         assert.ok(scene.includes(words), `${words} in\n${scene}`);
     }
-    // A saved scene shows the same picture again.
-    const last = await picture();
+    const last = await picture(shown);
     await drop(shown, [{ name: "head.toml", bytes: Buffer.from(scene) }]);
-    assert.equal(await picture(), last);
+    assert.equal(await picture(shown), last);
     assert.deepEqual(faults, []);
 });
 
-test("channels are shown and hidden one by one", async () => {
-    const { page: shown, faults } = await demo("backend=cpu&workers=2", SMALL);
-    await drop(shown, [{ name: "imagej.tif", bytes: readFileSync(join(fixtures, "channels", "imagej.tif")) }]);
-    const switches = shown.locator("#channels input");
-    assert.ok(await switches.count() >= 2, await text(shown, "#volume"));
-    const scene = () => shown.evaluate(() => window.view.scene());
-    const all = await colors(shown);
-    assert.ok(all > 1);
-    for (const box of await switches.all()) await box.uncheck();
-    await shown.waitForFunction(async () => ((await window.view.scene()).match(/^visible = false$/gm) ?? []).length >= 2);
-    assert.equal(await colors(shown), 1, await scene());
-    await switches.last().check();
-    await shown.waitForFunction(async () => ((await window.view.scene()).match(/^visible = false$/gm) ?? []).length === document.querySelectorAll("#channels input").length - 1);
-    assert.ok(await colors(shown) > 1, await scene());
-    // The plot edits the channel whose name was pressed.
-    await shown.locator("#channels button").last().click();
+test("buttons save the picture, reset the camera and the opacity, and open files", async () => {
+    const { page: shown, faults } = await demo(opened, "backend=cpu&workers=2", SMALL);
+    await shown.selectOption("#example", "tomato:96");
+    await isIdle(shown);
+    assert.match(await text(shown, "#volume"), /^tomato: 96 × /);
+    const start = await picture(shown);
+
+    const [saved] = await Promise.all([shown.waitForEvent("download"), shown.click("#save-picture")]);
+    assert.equal(saved.suggestedFilename(), "tomato.png");
+    const png = decode(readFileSync(await saved.path()));
+    const box = await shown.locator("#canvas").boundingBox();
+    assert.deepEqual([png.width, png.height], [box.width, box.height].map(Math.round));
+    assert.ok(new Set(png.data).size > 50);
+
+    await shown.evaluate(() => window.view.move({ orbit: [0.3, 0.1] }));
+    assert.notEqual(await picture(shown), start);
+    await shown.click("#home");
+    assert.equal(await picture(shown), start);
+
     await shown.locator("#plot circle").last().focus();
-    await shown.keyboard.press("Shift+ArrowDown");
-    await shown.waitForTimeout(300);
-    assert.equal(await text(shown, "#problem"), "");
-    assert.deepEqual(faults, []);
-});
+    const opacity = await shown.locator("#plot circle").last().getAttribute("aria-label");
+    for (let time = 0; time < 3; time++) await shown.keyboard.press("Shift+ArrowDown");
+    await sceneHas(shown, /^opacity = /);
+    assert.notEqual(await shown.locator("#plot circle").last().getAttribute("aria-label"), opacity);
+    await shown.click("#reset-transfer");
+    await shown.waitForFunction((label) => [...document.querySelectorAll("#plot circle")].at(-1).getAttribute("aria-label") === label, opacity);
+    assert.equal(await picture(shown), start);
 
-test("scenes are objects or texts, files are bytes or addresses, and mistakes are told", async () => {
-    const { page: shown } = await page(browser, `${url}tests/page.html`);
-    await shown.waitForFunction(() => window.isReady);
-    const bytes = readFileSync(join(fixtures, "c.npy")).toString("base64");
-    const result = await shown.evaluate(async (bytes) => {
-        const message = async (work) => {
-            try {
-                await work();
-                return "no error";
-            } catch (error) {
-                return error.message;
-            }
-        };
-        const hash = async (view) => [...new Uint8Array(await crypto.subtle.digest("SHA-256", (await view.pixels()).data))].join();
-        const view = await window.view([40, 30], { backend: "cpu", workers: 1 });
-        const none = await message(() => view.render());
-        await view.setScene("volume.builtin = \"head:16\"\nimage.background = [1, 0.5, 0, 1]\nclip.planes = [[0, 1, 0, 0]]\n");
-        const ofText = await hash(view);
-        await view.setScene({ volume: { builtin: "head:16" }, image: { background: [1, 0.5, 0, 1] }, clip: { planes: [[0, 1, 0, 0]] } });
-        const ofObject = await hash(view);
-        const key = await message(() => view.setScene({ volume: { builtin: "head:16" }, splating: {} }));
-        const kept = await hash(view);
-        const buffer = Uint8Array.from(atob(bytes), (letter) => letter.charCodeAt(0)).buffer;
-        const { dims } = await view.loadFile(buffer, { name: "c.npy" });
-        const unnamed = await message(() => view.loadFile(new ArrayBuffer(8)));
-        const address = await message(() => view.loadFile("nowhere.nrrd"));
-        const outside = await message(() => view.pick(40, 0));
-        view.dispose();
-        const ended = await message(() => view.render());
-        return { none, ofText, ofObject, key, kept, dims, unnamed, address, outside, ended };
-    }, bytes);
-    assert.equal(result.none, "no volume is loaded");
-    assert.equal(result.ofObject, result.ofText);
-    assert.equal(result.kept, result.ofText);
-    assert.match(result.key, /^scene: splating: /);
-    assert.equal(result.dims.length, 3);
-    assert.match(result.unnamed, /^volume: format: found none, allowed: NRRD/);
-    assert.match(result.address, /nowhere\.nrrd: 404/);
-    assert.match(result.outside, /region: found 40,0,1,1/);
-    assert.equal(result.ended, "it was disposed of");
+    const [chooser] = await Promise.all([shown.waitForEvent("filechooser"), shown.click("#open")]);
+    assert.ok(chooser.isMultiple());
+    await chooser.setFiles({ name: "itk.nrrd", mimeType: "", buffer: fixture("itk.nrrd") });
+    await shown.waitForFunction(() => document.getElementById("volume").textContent.startsWith("itk.nrrd: 5 × 4 × 3"));
+    assert.equal(await shown.inputValue("#example"), "");
+    assert.ok(await colors(shown) > 1);
+    assert.deepEqual(faults, []);
 });
 
 test("a pick is the value under the pointer", async () => {
-    for (const backend of ["cpu", "gpu"]) {
-        const { page: shown } = await demo(`backend=${backend}&example=head:48`, SMALL);
+    for (const [backend, size] of [["cpu", SMALL], ["gpu", TINY]]) {
+        const { page: shown } = await demo(opened, `backend=${backend}&example=head:32`, size);
         const box = await shown.locator("#canvas").boundingBox();
         await shown.mouse.dblclick(box.x + box.width / 2, box.y + box.height / 2);
         await shown.waitForFunction(() => /^voxel \d+, \d+, \d+: \d/.test(document.getElementById("picked").textContent));
         await shown.mouse.dblclick(box.x + 5, box.y + 5);
         await shown.waitForFunction(() => document.getElementById("picked").textContent === "nothing opaque there");
     }
-});
-
-test("the page fits screens of every size", async () => {
-    for (const [width, height, scale] of [[1280, 800, 1], [820, 1100, 1], [390, 844, 2], [320, 568, 1]]) {
-        const options = { viewport: { width, height }, deviceScaleFactor: scale };
-        const { page: shown } = await demo("backend=cpu&example=head:64", options);
-        const wide = await shown.evaluate(() => document.documentElement.scrollWidth);
-        assert.ok(wide <= width, `${wide} of ${width}`);
-        const canvas = await shown.locator("#canvas").boundingBox();
-        assert.ok(canvas.width >= Math.min(width * 0.55, 300) && canvas.height >= 200, JSON.stringify(canvas));
-        await shown.screenshot({ path: join(screenshots, `${width}.png`) });
-        await shown.screenshot({ path: join(screenshots, `${width}-whole.png`), fullPage: true });
-    }
-});
-
-test("the first frame and the next ones, timed", async () => {
-    const { page: shown } = await page(browser, `${url}tests/page.html`);
-    await shown.waitForFunction(() => window.isReady);
-    const first = await shown.evaluate(async () => {
-        const start = performance.now();
-        const view = await window.view([256, 256], { backend: "cpu" });
-        await view.setScene("volume.builtin = \"head:64\"");
-        return performance.now() - start;
-    });
-    const frames = await shown.evaluate(async () => {
-        const view = await window.view([512, 512], { backend: "cpu", controls: true });
-        await view.setScene("volume.builtin = \"head:128\"");
-        const times = [];
-        for (let frame = 0; frame < 12; frame++) {
-            view.move({ orbit: [0.02, 0] });
-            const start = performance.now();
-            await view.render();
-            times.push(performance.now() - start);
-        }
-        return times;
-    });
-    // Printed, not asserted: what else the machine does slows frames down.
-    const [least, median] = [0, frames.length / 2].map((at) => [...frames].sort((a, b) => a - b)[at]);
-    console.log(`head:64 at 256²: ${first.toFixed(0)} ms; head:128 at 512²: ${least.toFixed(0)} ms a frame, median ${median.toFixed(0)} ms`);
-    assert.equal(frames.length, 12);
 });

@@ -8,7 +8,7 @@ import { fileURLToPath } from "node:url";
 /** The path below which everything lies. */
 export const BASE = "/some/where/";
 
-const root = dirname(dirname(fileURLToPath(import.meta.url)));
+const web = dirname(dirname(fileURLToPath(import.meta.url)));
 const types = {
     ".css": "text/css",
     ".html": "text/html; charset=utf-8",
@@ -18,11 +18,12 @@ const types = {
     ".wasm": "application/wasm",
 };
 
-export async function serve(port = 0) {
+/** Serves a folder; `url` is its address. */
+export async function serve(port = 0, root = web) {
     const server = createServer((request, response) => {
         const path = decodeURIComponent(new URL(request.url, "http://localhost").pathname);
         const file = path.startsWith(BASE) ? join(root, normalize(path.slice(BASE.length))) : "";
-        const at = file.endsWith("/") ? join(file, "index.html") : file;
+        const at = path.endsWith("/") ? join(file, "index.html") : file;
         try {
             if (!at.startsWith(root) || !statSync(at).isFile()) throw new Error();
         } catch {

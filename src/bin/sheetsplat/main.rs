@@ -12,6 +12,7 @@ mod failure;
 mod index;
 mod info;
 mod interrupt;
+mod logging;
 mod memory;
 mod orbit;
 mod outputs;
@@ -93,9 +94,9 @@ fn main() -> ExitCode {
         (false, false) => "error,sheetsplat=warn",
         (false, true) => "error,sheetsplat=info",
     };
-    env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).init();
-    interrupt::listen();
     let progress = !quiet && !verbose;
+    logging::start(filter, progress);
+    interrupt::listen();
     let result = match command {
         Command::Render(arguments) => render::run(&arguments, progress),
         Command::Orbit(arguments) => orbit::run(&arguments, progress),

@@ -4,9 +4,9 @@
 //! nothing where no voxel in the boxes of its two points reaches the least value with an opacity, or none is as low as the greatest one.
 
 use glam::DVec3;
-use rayon::prelude::*;
 
 use crate::after::normalization::Normalization;
+use crate::parallel::prelude::*;
 use crate::volume::Grid;
 
 /// A voxel of a cell's box is at least the least number with an opacity.

@@ -278,10 +278,10 @@ impl Frame<'_> {
             let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * means.share);
             color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
             if self.has_gradient_opacity {
-                let length = self.length(gradient).to_array();
+                let length = self.length(gradient);
                 let factors: [f32; LANES] = std::array::from_fn(|lane| {
                     let ramp = self.transfer.tables(label(lane)).gradient_opacity;
-                    ramp.map_or(1.0, |ramp| ramp.at(f64::from(length[lane])) as f32)
+                    ramp.map_or(1.0, |ramp| ramp.at(length[lane]) as f32)
                 });
                 amount *= f32x8::load_array(simd, factors);
             }
@@ -318,8 +318,9 @@ impl Frame<'_> {
 
     /// The length of gradients, values per world unit.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn length<S: Simd>(&self, [x, y, z]: [f32x8<S>; 3]) -> f32x8<S> {
-        (x * x + y * y + z * z).sqrt() * self.per_number
+    pub(super) fn length<S: Simd>(&self, [x, y, z]: [f32x8<S>; 3]) -> [f64; LANES] {
+        let lengths = (x * x + y * y + z * z).sqrt() * self.per_number;
+        lengths.to_array().map(|length| f64::from(length) / self.field.gradient_length)
     }
 
     /// The label of the voxel whose cell contains a point of a pixel's ray, given by its position among slabs.

@@ -31,14 +31,29 @@ pub(in crate::cpu) struct Coefficients {
     exact: Option<Arc<[f32]>>,
     /// Of volumes of colours.
     colors: Option<Colors>,
+    ranges: Option<Ranges>,
+    /// Of the last frame, if the ranges are still its ranges.
     shown: Option<Shown>,
+    /// Whether the transfer function or the compositing have changed since.
+    is_stale: bool,
+}
+
+/// The minimum and maximum coefficients around bricks, which change with the view, but with no transfer function.
+#[derive(Clone, Debug)]
+struct Ranges {
+    /// The distances in voxels up to which they examined the values around bricks.
+    reaches: [UVec3; 2],
+    /// Around the kernels of the bricks' voxels.
+    of_kernels: BrickRanges,
+    /// Around slabs whose near planes rays meet in the cells of the bricks' voxels.
+    of_cells: BrickRanges,
 }
 
 /// The choice of bricks.
 #[derive(Clone, Debug)]
 struct Shown {
-    /// The distances in voxels up to which the tests of bricks examined the values around them.
-    reaches: [UVec3; 2],
+    /// Whether each brick of the grid is among `bricks`.
+    are_shown: Vec<bool>,
     /// The bricks whose voxels may affect a slab with an opacity.
     bricks: BrickList,
     /// The bricks of the grid in whose cells a ray may meet the near plane of a slab with an opacity.
@@ -60,7 +75,7 @@ impl Coefficients {
         let all = exact.as_deref().unwrap_or(volume.values());
         let numbers = Normalization::of(all.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
         let colors = Colors::new(volume, splatting.interpolation, kernel)?;
-        Ok(Self { numbers, exact, colors, shown: None })
+        Ok(Self { numbers, exact, colors, ranges: None, shown: None, is_stale: false })
     }
 
     /// All of them, in memory order; NaN at holes.
@@ -73,12 +88,13 @@ impl Coefficients {
         self.colors.as_ref().and_then(|colors| colors.of(volume))
     }
 
-    /// Forgets which bricks may be drawn, because the transfer function or the compositing changed.
-    pub(in crate::cpu) fn forget(&mut self) {
-        self.shown = None;
+    /// Lets the next frame test bricks anew, because the transfer function or the compositing changed.
+    pub(in crate::cpu) fn retest(&mut self) {
+        self.is_stale = true;
     }
 
-    /// Finds the bricks that may be drawn in a view, if that may have changed them.
+    /// Finds the bricks that may be drawn in a view, if that may have changed them. The values around bricks are examined only in a view with new
+    /// reaches; a changed transfer function tests the bricks' ranges, and makes a new list of bricks only if it shows others.
     pub(in crate::cpu) fn look(
         &mut self,
         (volume, transfer): (&Volume, &TransferFunction),
@@ -87,29 +103,46 @@ impl Coefficients {
     ) {
         let (geometry, grid) = (PlaneGeometry::new(view, volume.grid()), volume.grid());
         let reaches = [geometry.reach(view), geometry.reach_from_cells(view)];
-        if self.shown.as_ref().is_some_and(|shown| shown.reaches == reaches) {
+        let is_stale = std::mem::take(&mut self.is_stale);
+        let kept = self.ranges.take().filter(|ranges| ranges.reaches == reaches);
+        if kept.is_some() && self.shown.is_some() && !is_stale {
+            self.ranges = kept;
             return;
         }
+        let ranges = kept.unwrap_or_else(|| {
+            let [of_kernels, of_cells] = reaches.map(|reach| BrickRanges::new(grid, self.all(volume), reach));
+            Ranges { reaches, of_kernels, of_cells }
+        });
         let bearing = Bearing::of(compositing);
-        let [of_kernels, of_cells] = reaches.map(|reach| BrickRanges::new(grid, self.all(volume), reach));
-        let is_shown = of_kernels.shown(volume, transfer, bearing);
-        let voxels = of_kernels.voxels(volume, |brick| is_shown[brick]);
+        let are_shown = ranges.of_kernels.shown(volume, transfer, bearing);
+        let bricks = match self.shown.take() {
+            Some(old) if old.are_shown == are_shown => old.bricks,
+            _ => BrickList::new(grid, &ranges.of_kernels.voxels(volume, |brick| are_shown[brick])),
+        };
         let is_wanted = match is_choice(compositing) {
             // A value without an opacity may be chosen.
-            true => vec![true; is_shown.len()],
-            false => of_cells.shown(volume, transfer, bearing),
+            true => vec![true; are_shown.len()],
+            false => ranges.of_cells.shown(volume, transfer, bearing),
         };
         let wanted = (0..is_wanted.len() as u32).filter(|&brick| is_wanted[brick as usize]).collect();
         let cells = (!is_choice(compositing)).then(|| {
             let shown = Integrals::new(volume.labels().is_some(), transfer, compositing, &self.numbers).shown;
             Cells::new(grid, self.all(volume), &self.numbers, geometry.widest_half_box(view), shown, Work::Shared)
         });
-        self.shown = Some(Shown { reaches, bricks: BrickList::new(grid, &voxels), wanted, cells });
+        self.ranges = Some(ranges);
+        self.shown = Some(Shown { are_shown, bricks, wanted, cells });
     }
 
     /// For the last view that was looked at, the bricks whose voxels may affect a slab with an opacity.
     pub(super) fn bricks(&self) -> &[Brick] {
         self.shown.as_ref().map_or(&[], |shown| shown.bricks.bricks())
+    }
+
+    /// Where the lists of bricks and their ranges lie in memory.
+    #[cfg(test)]
+    pub(in crate::cpu) fn places(&self) -> [Option<*const ()>; 2] {
+        let bricks = self.shown.as_ref().map(|shown| shown.bricks.bricks().as_ptr().cast());
+        [bricks, self.ranges.as_ref().map(|ranges| ranges.of_kernels.place())]
     }
 
     /// For the last view that was looked at, the bricks, as indices into the grid's, in whose cells rays may enter a slab with an opacity.

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::classify::{Slab, mask};
 use super::frame::Frame;
@@ -47,21 +46,10 @@ impl Colors {
         interpolation: Interpolation,
         kernel: (f64, f64),
     ) -> Result<Option<Self>, RenderError> {
-        let Some(texels) = volume.colors() else { return Ok(None) };
         if interpolation == Interpolation::Smooth {
-            return Ok(Some(Self::Smooth));
+            return Ok(volume.colors().map(|_| Self::Smooth));
         }
-        let values = volume.values();
-        let mut colors = vec![[0.0; 4]; texels.len()];
-        for component in 0..4 {
-            let own = |(texel, value): (&Texel, &f32)| {
-                if value.is_nan() { f32::NAN } else { share(texel[component]) }
-            };
-            let numbers: Vec<f32> = texels.par_iter().zip(values).map(own).collect();
-            let exact = coefficients::exact(volume.grid(), &numbers, kernel, &|_| {})?;
-            colors.par_iter_mut().zip(exact).for_each(|(color, number)| color[component] = number);
-        }
-        Ok(Some(Self::Exact(colors.into())))
+        Ok(coefficients::of_colors(volume, kernel)?.map(Self::Exact))
     }
 
     pub(super) fn of<'a>(&'a self, volume: &'a Volume) -> Option<ColorsOf<'a>> {

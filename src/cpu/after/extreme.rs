@@ -246,7 +246,7 @@ impl Frame<'_> {
             });
             own.map(f32x8::to_array)
         });
-        let lengths = self.length(gradient).to_array();
+        let lengths = self.length(gradient);
         let places = place.to_array();
         let (mut alphas, mut colors) = ([0.0; LANES], [[0.0; LANES]; 3]);
         for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
@@ -257,7 +257,7 @@ impl Frame<'_> {
             alphas[lane] = match is_average {
                 true if tables.visible && tables.in_iso_range(value) => tables.opacity.at(value) as f32,
                 true => 0.0,
-                false => tables.alpha(value, f64::from(lengths[lane])) as f32,
+                false => tables.alpha(value, lengths[lane]) as f32,
             };
             let color = tables.color.at(value).as_vec3().to_array();
             let [rgb @ .., opacity] = own.map_or([color[0], color[1], color[2], 1.0], |own| own.map(|row| row[lane]));

@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
-use rayon::prelude::*;
 
 use super::extreme::is_choice;
 use super::field::Field;
@@ -29,6 +28,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::tile_grid;
+use crate::parallel::prelude::*;
 use crate::part::Resolver;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
@@ -65,7 +65,7 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) has_gradient_opacity: bool,
     /// Values per number.
     pub(super) per_number: f32,
-    /// In numbers.
+    /// In numbers per [`Field::gradient_length`].
     pub(super) min_gradient: f32,
     /// Whether labels have tables of their own.
     pub(super) labels: bool,
@@ -114,18 +114,13 @@ impl<'a> Frame<'a> {
             }
         }
         let (at_hand, extent, coefficients, colors) = matter.at_hand();
+        let kernel = (splatting.radius, splatting.falloff);
+        let field = Field::new((at_hand, extent), (coefficients, colors), numbers, kernel, shading.gradient);
         Self {
             channel,
             matter,
             transfer,
             numbers,
-            field: Field::new(
-                (at_hand, extent),
-                (coefficients, colors),
-                numbers,
-                (splatting.radius, splatting.falloff),
-                shading.gradient,
-            ),
             integrals: Integrals::new(labelled.is_some(), transfer, splatting.compositing, &matter.all_numbers()),
             shader: Shader::new(shading, splatting.compositing),
             compositor: Compositor {
@@ -141,7 +136,9 @@ impl<'a> Frame<'a> {
             needs_gradients: shading.enabled || has_gradient_opacity,
             has_gradient_opacity,
             per_number: (1.0 / numbers.scale) as f32,
-            min_gradient: (MIN_GRADIENT * numbers.scale) as f32,
+            // A length of 0 is below it.
+            min_gradient: ((MIN_GRADIENT * numbers.scale * field.gradient_length) as f32).max(f32::MIN_POSITIVE),
+            field,
             labels: labelled.is_some() && !transfer.labels.is_empty(),
             to_eye: (-view.basis.w).to_array().map(|component| component as f32),
             touched: touched(&placement, &matter),

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use glam::{DVec2, DVec3, UVec3};
-use rayon::prelude::*;
 
 use crate::cpu::bin::Placed;
 use crate::cpu::project::floor;
@@ -13,6 +12,7 @@ use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::slab;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick::{self, Brick};
+use crate::parallel::prelude::*;
 use crate::volume::Grid;
 
 /// Pixels around boxes, and slabs around their depths, for rounding.

@@ -57,7 +57,8 @@ impl Frame<'_> {
             let [start, end] = [starts[lane].max(0.0), ends[lane].min(1.0)].map(f64::from);
             let values = numbers.map(|numbers| self.value(numbers[lane]));
             let gradients = gradients.map(|[x, y, z]| {
-                DVec3::new(x[lane].into(), y[lane].into(), z[lane].into()) * f64::from(self.per_number)
+                let per_world = f64::from(self.per_number) / self.field.gradient_length;
+                DVec3::new(x[lane].into(), y[lane].into(), z[lane].into()) * per_world
             });
             let at = [looks.origin[0] + column + lane, looks.origin[1] + row];
             for ends in self.pieces(at, f64::from(slab.number), [start, end]) {

@@ -12,11 +12,11 @@ mod source;
 use std::sync::Arc;
 
 use glam::UVec3;
-use rayon::ThreadPool;
 
 use super::bin::Placed;
 use super::material::Material;
 use crate::lists::quad_plan::Overlaps;
+use crate::parallel::ThreadPool;
 use crate::volume::Grid;
 use crate::volume::range::{EMPTY, union};
 pub(super) use approach::Approach;

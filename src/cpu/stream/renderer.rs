@@ -22,6 +22,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::kernel::Kernel;
 use crate::lists::iso_range::ValueSet;
+use crate::parallel::{ThreadPoolBuilder, current_num_threads};
 use crate::part::{self, Content, Part};
 use crate::rendering::Rendering;
 use crate::scene::Scene;
@@ -175,7 +176,7 @@ impl StreamRenderer {
 
     /// Checks that the boxes of voxels fit into memory that threads copy from chunks, given the bytes of one.
     fn check_held(&self, bytes: f64) -> Result<(), SettingError> {
-        let all = bytes * rayon::current_num_threads() as f64;
+        let all = bytes * current_num_threads() as f64;
         let memory = self.volume.memory.max(LEAST_HELD);
         if all <= memory as f64 {
             return Ok(());
@@ -198,8 +199,8 @@ impl StreamRenderer {
         let StreamedVolume { store, level, memory, .. } = &self.volume;
         let (splatting, grid) = (&scene.splatting, store.levels()[*level].grid);
         let slabs = window.with_lead(splatting.compositing, Classification::Before).slabs;
-        let threads = rayon::current_num_threads();
-        let readers = rayon::ThreadPoolBuilder::new().num_threads(threads.max(LEAST_READERS)).build();
+        let threads = current_num_threads();
+        let readers = ThreadPoolBuilder::new().num_threads(threads.max(LEAST_READERS)).build();
         let readers =
             readers.map_err(|error| SettingError::new("threads", error.to_string(), "threads that can be started"))?;
         let side = Source::side(store.levels()[*level].chunk, &grid);

@@ -4,13 +4,13 @@ use std::collections::HashSet;
 use std::ops::Range;
 
 use glam::{DVec2, DVec3, UVec3};
-use rayon::prelude::*;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::iso_range::ValueSet;
+use crate::parallel::prelude::*;
 use crate::scene::Scene;
 use crate::settings::splatting::Classification;
 use crate::settings::window::Region;

@@ -6,10 +6,10 @@
 //! kernel (Hestenes, Stiefel, *Methods of conjugate gradients for solving linear systems*, 1952).
 
 use glam::IVec3;
-use rayon::prelude::*;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
+use crate::parallel::prelude::*;
 use crate::volume::Grid;
 
 /// The maximum error of the field at voxels, relative to the range of values; the specification requires 1e-5.

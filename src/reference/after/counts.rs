@@ -5,13 +5,13 @@
 //! its voxels.
 
 use glam::{DVec3, UVec2, UVec3};
-use rayon::prelude::*;
 
 use super::Frame;
 use super::pixel::Pixel;
 use super::slab_integral::is_visible;
 use crate::error::RenderError;
 use crate::lists::quad_plan::tile_grid;
+use crate::parallel::prelude::*;
 use crate::reference::Host;
 use crate::scene::Scene;
 use crate::settings::splatting::Compositing;

@@ -27,11 +27,11 @@ mod surface;
 use std::ops::Range;
 
 use glam::{DVec3, UVec2};
-use rayon::prelude::*;
 
 use super::{Areas, Buffer, Culled, Geometry, Host, resolve};
 use crate::error::RenderError;
 use crate::lists::classify::channels;
+use crate::parallel::prelude::*;
 use crate::part::Content;
 use crate::scene::Scene;
 use crate::settings::splatting::Compositing;

@@ -8,10 +8,10 @@ mod tomato;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DVec3, UVec3};
-use rayon::prelude::*;
 
 use super::access::{Access, ReadOptions};
 use super::{Grid, Labels, Volume, VolumeError};
+use crate::parallel::prelude::*;
 
 /// The names that [`volume`] accepts.
 pub const NAMES: &[&str] = &["cube", "head", "nerve", "tomato", "marschner-lobb"];

@@ -1,10 +1,10 @@
 //! A ganglion nerve cell as a confocal microscope sees it: a cell body and branching dendrites in empty space.
 
 use glam::{DVec3, UVec3, dvec3};
-use rayon::prelude::*;
 
 use super::Grid;
 use super::sdf::{ellipsoid, smoothstep, wave};
+use crate::parallel::prelude::*;
 
 /// By how many world units a tube appears thicker along z, where the microscope blurs more.
 const BLUR: f64 = 2.2;

@@ -1,9 +1,9 @@
 //! Signed distances (negative inside), and how solids become voxel values.
 
 use glam::{DVec3, UVec3};
-use rayon::prelude::*;
 
 use super::Grid;
+use crate::parallel::prelude::*;
 
 /// The edge, in voxels, of the largest blocks that are tested as a whole.
 const BLOCK: u32 = 8;

@@ -52,6 +52,12 @@ tags! {
     PIXEL_REPRESENTATION = 0x0028_0103 "PixelRepresentation",
     INTERCEPT = 0x0028_1052 "RescaleIntercept",
     SLOPE = 0x0028_1053 "RescaleSlope",
+    RED_DESCRIPTOR = 0x0028_1101 "RedPaletteColorLookupTableDescriptor",
+    GREEN_DESCRIPTOR = 0x0028_1102 "GreenPaletteColorLookupTableDescriptor",
+    BLUE_DESCRIPTOR = 0x0028_1103 "BluePaletteColorLookupTableDescriptor",
+    RED_TABLE = 0x0028_1201 "RedPaletteColorLookupTableData",
+    GREEN_TABLE = 0x0028_1202 "GreenPaletteColorLookupTableData",
+    BLUE_TABLE = 0x0028_1203 "BluePaletteColorLookupTableData",
     PIXEL_MEASURES = 0x0028_9110 "PixelMeasuresSequence",
     PIXEL_TRANSFORMATION = 0x0028_9145 "PixelValueTransformationSequence",
     SHARED_GROUPS = 0x5200_9229 "SharedFunctionalGroupsSequence",
@@ -89,6 +95,13 @@ impl Dataset {
             [high, low] => Ok(Some(u16::from_be_bytes([high, low]))),
             _ => Err(self.invalid(tag, format!("{} bytes", value.len()), "one number of 2 bytes")),
         }
+    }
+
+    /// A value that is numbers of 16 bits.
+    pub(super) fn shorts(&self, tag: Tag) -> Option<Vec<u16>> {
+        let number = if self.big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+        let value = self.values.get(&tag)?;
+        Some(value.as_chunks().0.iter().map(|&bytes| number(bytes)).collect())
     }
 
     /// A value that is N finite numbers written as text.

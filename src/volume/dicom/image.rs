@@ -12,9 +12,13 @@ use super::super::source::{invalid, io_error};
 use super::codecs::Codec;
 use super::dataset::{Dataset, Tag, tags};
 use super::elements::{Elements, PixelData};
+use super::palette::{self, Palette};
 
 /// The class of files that contain no image but a list of other files.
 const DIRECTORY: &str = "1.2.840.10008.1.3.10";
+
+/// The photometric interpretation of pixels that are indices of a palette.
+const INDICES: &str = "PALETTE COLOR";
 
 /// An image of one or more frames.
 pub(super) struct Image {
@@ -23,6 +27,8 @@ pub(super) struct Image {
     pub(super) series: String,
     pub(super) description: String,
     pub(super) pixels: Pixels,
+    /// The colours of values, if these are indices.
+    pub(super) palette: Option<Palette>,
     pub(super) frames: Vec<Frame>,
     codec: Codec,
     data: PixelData,
@@ -45,6 +51,8 @@ pub(super) struct Pixels {
     big_endian: bool,
     /// Whether the minimum sample is white.
     is_inverted: bool,
+    /// Whether the samples are a luminance and two differences of colours.
+    is_ybr: bool,
 }
 
 /// A frame's position, in LPS and millimetres.
@@ -86,6 +94,9 @@ impl Image {
         let count = count as usize;
         pixels.check(&data, tag, &pixel_data, count, codec)?;
         let frames = frames(&data, count)?;
+        let is_signed = matches!(pixels.kind, SampleType::I8 | SampleType::I16 | SampleType::I32);
+        let has_palette = data.text(tags::PHOTOMETRIC).as_deref() == Some(INDICES);
+        let palette = has_palette.then(|| palette::read(&data, is_signed)).transpose()?;
         let inflated = match &pixel_data {
             PixelData::Native { bytes, .. } if rest.is_inflated() => {
                 access.reserve(path, "PixelData", format!("{count} inflated frames"), *bytes)?;
@@ -103,6 +114,7 @@ impl Image {
                 .join(" "),
             frames,
             pixels,
+            palette,
             codec,
             data: pixel_data,
             inflated,
@@ -133,7 +145,11 @@ impl Image {
             bytes.chunks_exact_mut(kind.bytes() as usize).for_each(<[u8]>::reverse);
         }
         self.pixels.make_numbers(&mut bytes);
-        Ok(self.pixels.side_by_side(bytes, self.codec))
+        let mut bytes = self.pixels.side_by_side(bytes, self.codec);
+        if self.pixels.is_ybr {
+            bytes.as_chunks_mut().0.iter_mut().for_each(|pixel| *pixel = rgb(*pixel));
+        }
+        Ok(bytes)
     }
 
     /// The bytes of some ranges of the file, each given by its first byte and its length.
@@ -171,18 +187,20 @@ impl Pixels {
         }
         let is_planar = samples > 1 && data.unsigned(tags::PLANAR)?.unwrap_or(0) == 1;
         let photometric = data.text(tags::PHOTOMETRIC).unwrap_or_default();
-        let is_inverted = match photometric.as_str() {
+        let [is_inverted, is_ybr] = match photometric.as_str() {
             // Which float is white is undefined.
-            "MONOCHROME1" if tag == tags::PIXEL_DATA && samples == 1 => true,
-            "MONOCHROME2" if samples == 1 => false,
-            "RGB" if samples == 3 && codec != Codec::Jpeg => false,
+            "MONOCHROME1" if tag == tags::PIXEL_DATA && samples == 1 => [true, false],
+            "MONOCHROME2" if samples == 1 => [false; 2],
+            INDICES if tag == tags::PIXEL_DATA && samples == 1 => [false; 2],
+            "RGB" if samples == 3 && codec != Codec::Jpeg => [false; 2],
             // The decoder of JPEG gives red, green and blue.
-            "YBR_FULL" | "YBR_FULL_422" if samples == 3 && codec == Codec::Jpeg => false,
+            "YBR_FULL" | "YBR_FULL_422" if samples == 3 && codec == Codec::Jpeg => [false; 2],
+            "YBR_FULL" if samples == 3 => [false, true],
             _ => {
                 let allowed = match (samples, codec) {
-                    (1, _) => "MONOCHROME2, or MONOCHROME1 for whole numbers",
+                    (1, _) => "MONOCHROME2, or MONOCHROME1 or PALETTE COLOR for whole numbers",
                     (_, Codec::Jpeg) => "YBR_FULL or YBR_FULL_422 for colours",
-                    _ => "RGB for colours",
+                    _ => "RGB or YBR_FULL for colours",
                 };
                 return Err(data.invalid(tags::PHOTOMETRIC, photometric, allowed));
             }
@@ -190,6 +208,9 @@ impl Pixels {
         let allocated = required(tags::BITS_ALLOCATED)?;
         if samples > 1 && (tag != tags::PIXEL_DATA || ![8, 16].contains(&allocated)) {
             return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "whole numbers of 8 or 16 bits for colours"));
+        }
+        if is_ybr && allocated != 8 {
+            return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "8 bits for YBR_FULL"));
         }
         let is_signed = data.unsigned(tags::PIXEL_REPRESENTATION)?.unwrap_or(0) == 1;
         let kind = match (tag, allocated, is_signed) {
@@ -204,7 +225,8 @@ impl Pixels {
             _ => return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "8, 16 or 32, of floats 32 or 64")),
         };
         if tag != tags::PIXEL_DATA {
-            return Ok(Self { columns, rows, kind, samples, is_planar, bits: allocated, big_endian, is_inverted });
+            let bits = allocated;
+            return Ok(Self { columns, rows, kind, samples, is_planar, bits, big_endian, is_inverted, is_ybr });
         }
         let bits = data.unsigned(tags::BITS_STORED)?.unwrap_or(allocated);
         if !(1..=allocated).contains(&bits) {
@@ -214,7 +236,7 @@ impl Pixels {
         if high != bits - 1 {
             return Err(data.invalid(tags::HIGH_BIT, high, format!("{}, the highest of {bits}", bits - 1)));
         }
-        Ok(Self { columns, rows, kind, samples, is_planar, bits, big_endian, is_inverted })
+        Ok(Self { columns, rows, kind, samples, is_planar, bits, big_endian, is_inverted, is_ybr })
     }
 
     /// The size of a frame in bytes.
@@ -307,6 +329,13 @@ impl Pixels {
             SampleType::U64 | SampleType::I64 | SampleType::F32 | SampleType::F64 => {}
         }
     }
+}
+
+/// Red, green and blue of a luminance and two differences of colours (`YBR_FULL`: ITU-R BT.601 over the whole range).
+fn rgb([y, blue, red]: [u8; 3]) -> [u8; 3] {
+    let [y, blue, red] = [f64::from(y), f64::from(blue) - 128.0, f64::from(red) - 128.0];
+    let colors = [y + 1.402 * red, y - 0.344_136 * blue - 0.714_136 * red, y + 1.772 * blue];
+    colors.map(|color| color.round().clamp(0.0, 255.0) as u8)
 }
 
 /// The positions of frames, from each frame's own groups of elements, the shared groups, or the file's own elements.

@@ -11,12 +11,12 @@ mod codecs;
 mod dataset;
 mod elements;
 mod image;
+mod palette;
 mod series;
 
 use std::path::{Path, PathBuf};
 
 use glam::DMat3;
-use rayon::prelude::*;
 
 use self::image::Image;
 use self::series::Series;
@@ -27,6 +27,8 @@ use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::{SIZES, Samples, Voxel, dims_of};
 use super::series::apart;
 use super::source::invalid;
+use crate::parallel;
+use crate::parallel::prelude::*;
 
 /// Reads the frames of one file.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
@@ -64,7 +66,7 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
     Samples { kind, dims, big_endian: false, rescale: None, z_fastest: false }.reserve::<T>(path, access)?;
     let mut values = Vec::new();
     // One slice per thread at a time, because codecs are slow.
-    for slices in slices.chunks(rayon::current_num_threads()) {
+    for slices in slices.chunks(parallel::current_num_threads()) {
         let frames: Vec<_> = slices.par_iter().map(|slice| images[slice.image].frame(slice.frame, access)).collect();
         for (slice, frame) in slices.iter().zip(frames) {
             let image = &images[slice.image];
@@ -83,6 +85,12 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
     let origin = RAS_FROM_LPS * slices[0].position;
     let orientation = Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * lattice.axes, origin });
     let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
-    let loaded = Loaded { spacing, unit, orientation, series, ..Loaded::new(dims, kind, values) };
+    let is_rescaled = slices.iter().any(|slice| slice.rescale != [1.0, 0.0]);
+    let is_shared = images.iter().all(|image| image.palette == first.palette);
+    if first.palette.is_some() && (is_rescaled || !is_shared) {
+        log::warn!("{}: palettes differ, or indices are rescaled: no colour map is offered", path.display());
+    }
+    let palette = first.palette.clone().filter(|_| is_shared && !is_rescaled);
+    let loaded = Loaded { spacing, unit, orientation, palette, series, ..Loaded::new(dims, kind, values) };
     lattice.straighten(path, series::POSITION, loaded, access)
 }

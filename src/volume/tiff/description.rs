@@ -16,7 +16,7 @@ use super::super::unit::{common, unit};
 use super::super::xml;
 use super::display;
 use super::pages::Pages;
-use super::stack::{Axis, Place, Stack};
+use super::stack::{Axis, Place, Run, Stack};
 
 /// A resolution in pixels per inch that programs write by default, without meaning.
 const NOMINAL_DPI: f64 = 72.0;
@@ -31,6 +31,8 @@ pub(super) struct Calibration {
     pub(super) unit: Option<String>,
     /// What the pages show.
     pub(super) stack: Option<Stack>,
+    /// Where pages are not in the stack's order.
+    pub(super) runs: Vec<Run>,
     pub(super) channel_names: Vec<String>,
     pub(super) displays: Vec<ChannelDisplay>,
     /// Slope and intercept.
@@ -45,7 +47,7 @@ impl Calibration {
             return Self::of_image_j(pages, &description);
         }
         if description.contains("<OME") || description.contains("<ome:OME") {
-            return Self::of_ome(&pages.path, &description);
+            return Self::of_ome(&pages.path, pages.page.samples, &description);
         }
         let resolution_unit = pages.unsigned::<u16>(Tag::ResolutionUnit)?.unwrap_or(INCH);
         let (spacing, unit) = match (pixels_per_unit(pages), resolution_unit) {
@@ -137,11 +139,12 @@ impl Calibration {
         // ImageJ omits a distance of 1.
         let between_slices = between.or((images > 1).then_some(1.0));
         let (stack, channel_names) = (Some(stack), Vec::new());
-        Ok(Self { spacing, between_slices, unit: length_unit, stack, channel_names, displays, rescale })
+        let (unit, runs) = (length_unit, Vec::new());
+        Ok(Self { spacing, between_slices, unit, stack, runs, channel_names, displays, rescale })
     }
 
-    /// Parses the attributes of the single element `Pixels`.
-    fn of_ome(path: &Path, description: &str) -> Result<Self, VolumeError> {
+    /// Parses the attributes of the single element `Pixels`. A pixel has a number of samples.
+    fn of_ome(path: &Path, samples: u32, description: &str) -> Result<Self, VolumeError> {
         let damage = |error| xml::damage(path, error);
         let mut reader = Reader::from_str(description);
         let mut pixels: Option<Fields> = None;
@@ -181,13 +184,13 @@ impl Calibration {
             axes.as_slice().try_into().ok().filter(|_| is_all)
         })?;
         let [slices, channels, times] = [count("SizeZ")?, count("SizeC")?, count("SizeT")?];
-        let stack = Stack { slices, channels, times, order };
+        let stack = Stack { slices, channels, times, order }.of_pixels(samples);
         if stack.pages().is_none() {
             let found = format!("{slices}, {channels}, {times}");
             let allowed = format!("at most {} pages, and {MAX_CHANNELS} channels", u32::MAX);
             return Err(pixels.invalid("SizeZ, SizeC, SizeT", found, allowed));
         }
-        tiff_data.iter().try_for_each(|tiff_data| check_order(tiff_data, &stack))?;
+        let runs = tiff_data.iter().map(|tiff_data| run(tiff_data, &stack)).collect::<Result<Vec<Run>, _>>()?;
         let size = |name: &str| {
             pixels.value(name, "a positive finite number", |text| match text {
                 None => Some(None),
@@ -210,7 +213,8 @@ impl Calibration {
         let display =
             |color: Option<DVec3>| ChannelDisplay { colors: color.into_iter().collect(), ..ChannelDisplay::default() };
         let displays = colors.into_iter().map(display).collect();
-        Ok(Self { spacing, between_slices: z, unit, stack: Some(stack), channel_names, displays, rescale: None })
+        let stack = Some(stack);
+        Ok(Self { spacing, between_slices: z, unit, stack, runs, channel_names, displays, rescale: None })
     }
 }
 
@@ -241,16 +245,20 @@ fn value_function(fields: &Fields) -> Result<Option<[f64; 2]>, VolumeError> {
     }
 }
 
-/// Refuses pages that are not in the order of the slices.
-fn check_order(tiff_data: &Fields, stack: &Stack) -> Result<(), VolumeError> {
-    let number = |name: &str| tiff_data.value(name, "a number", |text| text.unwrap_or("0").parse::<u32>().ok());
-    let page = number("IFD")?;
-    let place = Place { slice: number("FirstZ")?, channel: number("FirstC")?, time: number("FirstT")? };
-    if stack.place(page) == place {
-        return Ok(());
-    }
-    let found = format!("slice {} on page {page}", place.slice);
-    Err(tiff_data.invalid("TiffData", found, "pages in the order of the slices, channels and times"))
+/// The pages that an element `TiffData` is about: one if it names the first, all that are left if it does not, or as many as it says.
+fn run(tiff_data: &Fields, stack: &Stack) -> Result<Run, VolumeError> {
+    let number = |name: &str, default: u32| {
+        tiff_data.value(name, "a number", |text| text.map_or(Some(default), |text| text.parse::<u32>().ok()))
+    };
+    let place = Place { slice: number("FirstZ", 0)?, channel: number("FirstC", 0)?, time: number("FirstT", 0)? };
+    let first = stack.number(place).ok_or_else(|| {
+        let Place { slice, channel, time } = place;
+        let Stack { slices, channels, times, .. } = stack;
+        let allowed = format!("numbers below SizeZ, SizeC and SizeT: {slices}, {channels}, {times}");
+        tiff_data.invalid("FirstZ, FirstC, FirstT", format!("{slice}, {channel}, {time}"), allowed)
+    })?;
+    let count = if tiff_data.get("IFD").is_some() { 1 } else { u32::MAX };
+    Ok(Run { page: number("IFD", 0)?, number: first, count: number("PlaneCount", count)? })
 }
 
 /// The axis that a letter stands for.

@@ -18,7 +18,7 @@ use glam::DVec3;
 
 use self::description::Calibration;
 use self::pages::{Page, Pages};
-use self::stack::{Place, Stack};
+use self::stack::{Place, Run, Stack};
 use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
@@ -39,12 +39,13 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     }
     series.check(path, selection)?;
     let channels = series.channels(selection);
-    slices.values.resize_with(channels.len(), Vec::new);
-    // The channel of a page among those that are read.
+    slices.channels.resize_with(channels.len(), OfChannel::default);
+    // The channel of a page among those that are read, and its slice.
     let wanted = |page: u32| {
-        let place = stack.map_or(Place::default(), |stack| stack.place(page));
+        let alone = Place { slice: page, ..Place::default() };
+        let place = stack.map_or(alone, |stack| stack.place(Run::number_of(&calibration.runs, page)));
         let is_read = place.time == selection.time.unwrap_or(0) && channels.contains(&place.channel);
-        is_read.then(|| (place.channel - channels.start) as usize)
+        is_read.then(|| ((place.channel - channels.start) as usize, place.slice))
     };
     let described = stack.and_then(Stack::pages);
     let mut count = 0;
@@ -59,10 +60,11 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         }
         while count < all {
             match wanted(count) {
-                Some(channel) => {
+                Some((channel, slice)) => {
                     samples.reserve::<T>(path, access)?;
                     let page = stream.read_samples(&samples)?;
-                    slices.values[channel].extend_from_slice(&page);
+                    slices.channels[channel].values.extend_from_slice(&page);
+                    slices.channels[channel].slices.push(slice);
                 }
                 None => stream.skip(samples.bytes())?,
             }
@@ -70,8 +72,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         }
     } else {
         loop {
-            if let Some(channel) = wanted(count) {
-                slices.add(&mut pages, channel, access)?;
+            if let Some(place) = wanted(count) {
+                slices.add(&mut pages, place, access)?;
             }
             count += 1;
             if !pages.next()? {
@@ -112,28 +114,63 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Acc
     let calibration = Calibration::of(&mut first)?;
     let mut slices = Slices::new(path, &first, &calibration)?;
     run::check(path, files)?;
-    slices.values.push(Vec::new());
-    for file in slices_of_one_kind {
-        slices.add(&mut Pages::open(file, access)?, 0, access)?;
+    slices.channels.push(OfChannel::default());
+    for (slice, file) in (0..).zip(slices_of_one_kind) {
+        slices.add(&mut Pages::open(file, access)?, (0, slice), access)?;
     }
     slices.finish(&calibration)
 }
 
-/// Slices of one size and type, appended in order to the values of their channel.
+/// The slices of a channel in the order of the file.
+struct OfChannel<T> {
+    values: Vec<T>,
+    /// The number of each slice.
+    slices: Vec<u32>,
+}
+
+impl<T> Default for OfChannel<T> {
+    fn default() -> Self {
+        Self { values: Vec::new(), slices: Vec::new() }
+    }
+}
+
+impl<T: Copy> OfChannel<T> {
+    /// The values with the slices in order; `None` if a slice is missing or comes twice.
+    fn in_order(self) -> Option<Vec<T>> {
+        let Self { mut values, mut slices } = self;
+        let mut sorted = slices.clone();
+        sorted.sort_unstable();
+        if !sorted.into_iter().eq(0..slices.len() as u32) {
+            return None;
+        }
+        let size = values.len() / slices.len().max(1);
+        for at in 0..slices.len() {
+            // Each exchange brings one slice to its place, which lies behind this one.
+            while slices[at] as usize != at {
+                let to = slices[at] as usize;
+                let (before, after) = values.split_at_mut(to * size);
+                before[at * size..][..size].swap_with_slice(&mut after[..size]);
+                slices.swap(at, to);
+            }
+        }
+        Some(values)
+    }
+}
+
+/// Slices of one size and type, appended to the values of their channel.
 struct Slices<'a, T> {
     path: &'a Path,
     page: Page,
     /// The first page's palette, unless another page has a different one.
     palette: Option<Vec<[u8; 3]>>,
     rescale: Option<[f64; 2]>,
-    /// By channel.
-    values: Vec<Vec<T>>,
+    channels: Vec<OfChannel<T>>,
 }
 
 impl<'a, T: Voxel> Slices<'a, T> {
     fn new(path: &'a Path, pages: &Pages, calibration: &Calibration) -> Result<Self, VolumeError> {
         let (page, palette) = (pages.page, pages.palette.clone());
-        Ok(Self { path, page, palette, rescale: calibration.rescale, values: Vec::new() })
+        Ok(Self { path, page, palette, rescale: calibration.rescale, channels: Vec::new() })
     }
 
     fn samples(&self, count: u32) -> Result<Samples, VolumeError> {
@@ -148,10 +185,10 @@ impl<'a, T: Voxel> Slices<'a, T> {
     fn count(&self, channel: usize) -> u32 {
         let [width, height] = self.page.size.map(u64::from);
         let samples = width * height * u64::from(self.page.samples);
-        (self.values[channel].len() as u64 / samples.max(1)) as u32
+        (self.channels[channel].values.len() as u64 / samples.max(1)) as u32
     }
 
-    fn add(&mut self, pages: &mut Pages, channel: usize, access: &Access) -> Result<(), VolumeError> {
+    fn add(&mut self, pages: &mut Pages, (channel, slice): (usize, u32), access: &Access) -> Result<(), VolumeError> {
         if pages.page != self.page {
             let allowed = format!("{}, as the first page", self.page);
             return Err(invalid(&pages.path, &pages.name(), pages.page, allowed));
@@ -167,16 +204,25 @@ impl<'a, T: Voxel> Slices<'a, T> {
         }
         self.samples(1)?.reserve::<T>(&pages.path, access)?;
         let bytes = pages.bytes()?;
-        samples.append(&pages.path, &bytes, &mut self.values[channel])
+        self.channels[channel].slices.push(slice);
+        samples.append(&pages.path, &bytes, &mut self.channels[channel].values)
     }
 
     fn finish(mut self, calibration: &Calibration) -> Result<Loaded<T>, VolumeError> {
         let Samples { dims, kind, .. } = self.samples(self.count(0))?;
         let components = self.page.samples;
         let dims = dims.with_x(dims.x / components);
-        let mut values = std::mem::take(&mut self.values).into_iter();
-        let mut all = values.next().unwrap_or_default();
-        values.for_each(|further| all.extend_from_slice(&further));
+        let mut all = Vec::new();
+        for channel in std::mem::take(&mut self.channels) {
+            let allowed = "every slice of every channel and time once, as the description says";
+            let refused = || invalid(self.path, "TiffData", "a slice that is missing or comes twice", allowed);
+            let values = channel.in_order().ok_or_else(refused)?;
+            if all.is_empty() {
+                all = values;
+            } else {
+                all.extend_from_slice(&values);
+            }
+        }
         all.shrink_to_fit();
         let all = apart(all, components as usize);
         let series = if components > 1 { Series::of_colors(components, 1) } else { Series::default() };
@@ -206,4 +252,21 @@ fn values_of(colors: &[[u8; 3]], rescale: Option<[f64; 2]>) -> Vec<(f64, DVec3)>
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
     points.dedup_by_key(|point| point.0);
     points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slices_come_into_their_order() {
+        let of = |slices: &[u32]| {
+            let values = slices.iter().flat_map(|&slice| [10 * slice, 10 * slice + 1]).collect();
+            OfChannel { values, slices: slices.to_vec() }.in_order()
+        };
+        for slices in [&[0, 1, 2, 3, 4][..], &[4, 3, 2, 1, 0], &[1, 2, 3, 4, 0], &[2, 0, 1, 4, 3]] {
+            assert_eq!(of(slices), Some(vec![0, 1, 10, 11, 20, 21, 30, 31, 40, 41]), "{slices:?}");
+        }
+        assert_eq!((of(&[0, 0, 1]), of(&[0, 2]), of(&[])), (None, None, Some(Vec::new())));
+    }
 }

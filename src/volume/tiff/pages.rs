@@ -47,6 +47,14 @@ impl Page {
         // The product of two 32-bit sizes fits in 64 bits.
         (width * height).saturating_mul(self.kind.bytes() * u64::from(self.samples))
     }
+
+    /// Planes of samples as pixels, whose samples lie side by side.
+    fn side_by_side(self, planes: &[u8]) -> Vec<u8> {
+        let (sample, samples) = (self.kind.bytes() as usize, self.samples as usize);
+        let plane = planes.len() / samples;
+        let pixel = |at: usize| (0..samples).flat_map(move |number| &planes[number * plane + at..][..sample]);
+        (0..plane).step_by(sample).flat_map(pixel).copied().collect()
+    }
 }
 
 impl Display for Page {
@@ -62,6 +70,8 @@ pub(super) struct Pages {
     pub(super) path: PathBuf,
     /// The current page.
     pub(super) page: Page,
+    /// Whether the samples of a pixel lie in planes of their own in the file.
+    is_planar: bool,
     /// Red, green and blue for each value, if the pixels are indices of a palette.
     pub(super) palette: Option<Vec<[u8; 3]>>,
     decoder: Decoder<Overlay>,
@@ -94,6 +104,7 @@ impl Pages {
         let mut pages = Self {
             path: path.to_owned(),
             page: Page { size: [0; 2], samples: 1, kind: SampleType::U8 },
+            is_planar: false,
             palette: None,
             decoder: decoder.with_limits(limits),
             number: 1,
@@ -197,12 +208,13 @@ impl Pages {
         let color = self.decoder.colortype().map_err(&failed)?;
         let layout = self.decoder.image_buffer_layout().map_err(&failed)?;
         let samples = match color {
-            ColorType::RGB(_) | ColorType::RGBA(_) if layout.planes == 1 => u32::from(color.num_samples()),
+            ColorType::RGB(_) | ColorType::RGBA(_) => u32::from(color.num_samples()),
             _ => 1,
         };
+        let planes = layout.planes as u32;
         let kind = match (color, layout.sample_type) {
             (ColorType::RGB(8 | 16 | 32 | 64) | ColorType::RGBA(8 | 16 | 32 | 64), Some(sample_type))
-                if layout.planes == 1 =>
+                if planes == 1 || planes == samples =>
             {
                 Some(sample_type)
             }
@@ -212,14 +224,14 @@ impl Pages {
         };
         let Some(kind) = kind.and_then(sample_type_of) else {
             let found = match color {
-                ColorType::RGB(_) | ColorType::RGBA(_) if layout.planes > 1 => "colours in separate planes".to_owned(),
                 _ if self.palette.is_some() => format!("indices of a palette, {color:?}"),
                 _ => format!("{color:?}, {:?}", layout.sample_format),
             };
-            let allowed = "one sample a pixel, or RGB or RGBA side by side: an integer of 8 to 64 bits, a float of 32 or 64 bits, or an index of 8 bits of a palette";
+            let allowed = "one sample a pixel, or RGB or RGBA: an integer of 8 to 64 bits, a float of 32 or 64 bits, or an index of 8 bits of a palette";
             return Err(invalid(&self.path, &name, found, allowed));
         };
         self.page = Page { size: [width, height], samples, kind };
+        self.is_planar = planes > 1;
         let tags = match self.decoder.get_chunk_type() {
             ChunkType::Strip => [Tag::StripOffsets, Tag::StripByteCounts],
             ChunkType::Tile => [Tag::TileOffsets, Tag::TileByteCounts],
@@ -270,7 +282,8 @@ impl Pages {
                 ChunkType::Strip => self.decoder.chunk_data_dimensions(chunk as u32),
                 ChunkType::Tile => self.decoder.chunk_dimensions(),
             };
-            let bytes = Page { size: [width, height], ..self.page }.bytes();
+            let samples = if self.is_planar { 1 } else { self.page.samples };
+            let bytes = Page { size: [width, height], samples, ..self.page }.bytes();
             let (offset, count) = (self.offsets.get(chunk).copied().unwrap_or(u64::MAX), self.counts[chunk]);
             let mut holds = count.saturating_mul(expansion) >= bytes;
             if holds && method != UNCOMPRESSED && is_suspicious(count, bytes) {
@@ -295,7 +308,7 @@ impl Pages {
         let mut ends = self.offsets.iter().zip(&self.counts).map(|(offset, count)| offset.checked_add(*count));
         let follow = self.offsets.iter().skip(1).all(|&offset| ends.next() == Some(Some(offset)));
         let is_strips = self.decoder.get_chunk_type() == ChunkType::Strip;
-        let is_one_piece = follow && is_strips && !self.is_compressed()?;
+        let is_one_piece = follow && is_strips && !self.is_planar && !self.is_compressed()?;
         let first = self.offsets.first().filter(|_| is_one_piece);
         let allowed = "as many as the description says, or uncompressed samples in one piece";
         first.copied().ok_or_else(|| invalid(&self.path, "pages", "1", allowed))
@@ -315,7 +328,7 @@ impl Pages {
             // The decoder inverts pages where 0 is white.
             bytes.iter_mut().for_each(|byte| *byte = !*byte);
         }
-        Ok(bytes)
+        Ok(if self.is_planar { self.page.side_by_side(&bytes) } else { bytes })
     }
 }
 

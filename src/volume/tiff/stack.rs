@@ -28,6 +28,27 @@ pub(super) struct Place {
     pub(super) time: u32,
 }
 
+/// Pages one after the other, which show what is one after the other in a stack's order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Run {
+    /// The first page, counted from 0.
+    pub(super) page: u32,
+    /// The number that it would have if all pages came in the stack's order.
+    pub(super) number: u32,
+    pub(super) count: u32,
+}
+
+impl Run {
+    /// The number of a page in the stack's order: that of the first run that holds it, or else its own.
+    pub(super) fn number_of(runs: &[Self], page: u32) -> u32 {
+        let within = |run: &Self| {
+            let at = page.checked_sub(run.page).filter(|&at| at < run.count)?;
+            run.number.checked_add(at)
+        };
+        runs.iter().find_map(within).unwrap_or(page)
+    }
+}
+
 impl Stack {
     /// The order in which ImageJ writes pages.
     pub(super) const IMAGE_J: [Axis; 3] = [Axis::Channel, Axis::Slice, Axis::Time];
@@ -71,6 +92,24 @@ impl Stack {
         place
     }
 
+    /// The page that shows what is at a place, if pages come in order; `None` if the stack has no such place.
+    pub(super) fn number(&self, place: Place) -> Option<u32> {
+        let (mut number, mut step) = (0_u32, 1_u32);
+        for axis in self.order {
+            let at = match axis {
+                Axis::Slice => place.slice,
+                Axis::Channel => place.channel,
+                Axis::Time => place.time,
+            };
+            if at >= self.count(axis) {
+                return None;
+            }
+            number = number.checked_add(at.checked_mul(step)?)?;
+            step = step.checked_mul(self.count(axis))?;
+        }
+        Some(number)
+    }
+
     /// The volumes of the pages.
     pub(super) fn series(&self) -> Series {
         Series { channels: self.channels, times: self.times, order: SeriesOrder::ChannelsFirst, is_color: false }
@@ -90,5 +129,16 @@ mod tests {
             .flat_map(|channel| (0..2).map(move |time| (channel, time)))
             .flat_map(|(channel, time)| (0..5).map(move |slice| Place { slice, channel, time }));
         assert_eq!(places, expected.collect::<Vec<_>>());
+        assert!(places.iter().zip(0..).all(|(&place, page)| stack.number(place) == Some(page)));
+        assert_eq!(stack.number(Place { slice: 5, channel: 0, time: 0 }), None);
+    }
+
+    #[test]
+    fn runs_of_pages() {
+        let runs = [Run { page: 4, number: 0, count: 2 }, Run { page: 0, number: 2, count: 3 }];
+        let numbers: Vec<u32> = (0..8).map(|page| Run::number_of(&runs, page)).collect();
+        assert_eq!(numbers, [2, 3, 4, 3, 0, 1, 6, 7]);
+        let all = [Run { page: 0, number: 0, count: u32::MAX }];
+        assert_eq!(Run::number_of(&all, u32::MAX), u32::MAX);
     }
 }

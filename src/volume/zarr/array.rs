@@ -7,7 +7,6 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use glam::UVec3;
-use rayon::prelude::*;
 use serde_json::Value;
 use zarrs::array::codec::api::{ArrayToBytesCodecTraits, CodecOptions};
 use zarrs::array::{Array, ArrayError, ArrayMetadata, ArrayMetadataV2, ArrayMetadataV3};
@@ -22,6 +21,8 @@ use super::codec;
 use super::half;
 use super::keys::Keys;
 use super::shards::{MAX_IN_SHARD, Shards};
+use crate::parallel;
+use crate::parallel::prelude::*;
 
 /// The maximum number of chunks of an array: more take longer to look for than anyone waits.
 const MAX_CHUNKS: u64 = 1 << 26;
@@ -228,7 +229,7 @@ impl ZarrArray {
 
     /// The number of chunks that are decoded at once to read a region.
     pub(super) fn at_once(&self, region: &Region) -> usize {
-        rayon::current_num_threads().min(self.count(region) as usize)
+        parallel::current_num_threads().min(self.count(region) as usize)
     }
 
     /// Reads a region that lies in the array, channel by channel, x fastest, into as many values. Returns what the store

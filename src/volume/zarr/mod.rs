@@ -29,6 +29,7 @@ use super::samples::{SIZES, Voxel, dims_of};
 use super::source::invalid;
 use super::store::{Store, StoreLevel, check_box, check_chunk};
 use super::{Grid, StoreFacts, VolumeError};
+use crate::parallel;
 use crate::stats::StoreCounts;
 
 /// Reads an image at one level.
@@ -114,7 +115,7 @@ pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result
         return Err(invalid(path, "channels", channels.len(), allowed));
     }
     for level in &image.levels {
-        level.array.reserve::<f32>(rayon::current_num_threads(), access)?;
+        level.array.reserve::<f32>(parallel::current_num_threads(), access)?;
     }
     let levels =
         image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() }).collect();

@@ -1,8 +1,9 @@
-//! The stages of classification after splatting by quads (SPEC §9) against the twin's field and composited pixels: `values`, `field` and `classify`,
-//! each given the numbers that the stage before it should give.
+//! The stages of classification after splatting (SPEC §9) against the twin's field and composited pixels: by quads `values`, `field` and `classify`,
+//! each given the numbers that the stage before it should give, and by tiles `gather_planes`.
 
 mod classify;
 mod field;
+mod gather_planes;
 mod values;
 
 use std::collections::BTreeMap;
@@ -14,7 +15,8 @@ use sheetsplat::internals::after::normalization::Normalization;
 use sheetsplat::internals::brick;
 use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::gpu::layout::{Brick, FieldVoxel};
-use sheetsplat::internals::gpu::uniforms::{self, Ramps};
+use sheetsplat::internals::gpu::ramps::{Integration, Ramps, Stored};
+use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::plane_geometry::PlaneGeometry;
@@ -103,7 +105,12 @@ impl<'a> Prepared<'a> {
         let view = ViewGeometry::new(grid, &scene.camera, splatting, [scene.image.width, scene.image.height]).unwrap();
         let coefficients: Vec<f32> = twin.field().coefficients().iter().map(|&c| c as f32).collect();
         let numbers = Normalization::of(coefficients.iter().copied()).unwrap();
-        let ramps = Ramps::with_integrals(transfer, splatting.compositing, &numbers);
+        let integration = Integration {
+            compositing: splatting.compositing,
+            numbers: std::slice::from_ref(&numbers),
+            radius: splatting.radius,
+        };
+        let ramps = Ramps::of_channels(transfer, &[Stored { labels: 1, colors: 0 }], 0, Some(integration));
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
         let values = VolumeTexture::upload(device, queue, volume.values()).unwrap();
         let frame = uniforms::frame(&view, &kernel, (grid, values.format), &ramps, scene);
@@ -167,9 +174,43 @@ fn with_case(
     (name, volume, scene): (&str, &Volume, &Scene),
     check: impl Fn(&Prepared<'_>, &Frame<'_>),
 ) {
+    with_host(gpu, Host::default(), (name, volume, scene), check);
+}
+
+/// The same for a host's surfaces, in `unit`s, and first hits.
+fn with_host(
+    gpu: &GpuHeadless,
+    host: Host<'_>,
+    (name, volume, scene): (&str, &Volume, &Scene),
+    check: impl Fn(&Prepared<'_>, &Frame<'_>),
+) {
     let transfer = scene.transfer.resolve(volume);
-    let twin = Frame::new(Host::default(), volume, &transfer, scene).unwrap();
+    let twin = Frame::new(host, volume, &transfer, scene).unwrap();
     check(&Prepared::new(gpu, (name, volume, scene), &transfer, &twin), &twin);
+}
+
+/// Planes and a box that cut through the head.
+fn cut(scene: &mut Scene) {
+    scene.clip.planes = vec![[0.3, 1.0, 0.2, 1.5], [-1.0, 0.2, 0.1, 4.0]];
+    scene.clip.crop = Some([DVec3::new(-6.0, -5.0, -9.0), DVec3::new(5.5, 7.0, 6.0)]);
+}
+
+/// Asserts that the words of first hits, sheet depths or 0, are where the twin has them. Returns the number of hits.
+fn assert_hits(prepared: &Prepared<'_>, twin: &Frame<'_>, words: &[u32], what: &str) -> usize {
+    let slabs = &prepared.view.slabs;
+    let (mut hits, mut off) = (0, 0);
+    for (word, expected) in words.iter().zip(twin.composite()) {
+        let found = (*word != 0).then(|| (f64::from(f32::from_bits(*word)) - slabs.origin) / slabs.width);
+        hits += usize::from(expected.first_hit.is_some());
+        off += usize::from(match (found, expected.first_hit) {
+            (Some(found), Some(expected)) => (found - expected).abs() > 2e-3,
+            (None, None) => false,
+            _ => true,
+        });
+    }
+    // Where opacity hardly grows, rounding moves the hit.
+    assert!(off * 400 <= words.len(), "{what}: {off} of {hits} hits");
+    hits
 }
 
 /// A power of two from -126 to 127.

@@ -48,7 +48,7 @@ pub(super) fn records(prepared: &Prepared<'_>, places: &[u32]) -> Vec<FieldVoxel
 }
 
 /// The coefficients as numbers.
-fn numbers_of(prepared: &Prepared<'_>) -> Vec<f32> {
+pub(super) fn numbers_of(prepared: &Prepared<'_>) -> Vec<f32> {
     prepared.coefficients.iter().map(|&c| prepared.numbers.apply(f64::from(c)) as f32).collect()
 }
 

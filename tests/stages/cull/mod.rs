@@ -7,19 +7,23 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use glam::{DVec3, UVec3};
 use sheetsplat::headless::GpuHeadless;
+use sheetsplat::internals::after::normalization::Normalization;
 use sheetsplat::internals::brick::{self, BRICK_VOXELS};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
-use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, Frame, Indirect, SheetGroup, Tally};
+use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, FieldVoxel, Frame, Indirect, SheetGroup, Tally};
+use sheetsplat::internals::gpu::ramps::Ramps;
 use sheetsplat::internals::gpu::targets::Targets;
-use sheetsplat::internals::gpu::uniforms::{self, Ramps};
+use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::pass::cull::{Cull, CullBuffers, CullList};
+use sheetsplat::internals::pass::values::PlaneBuffers;
+use sheetsplat::internals::plane_geometry::PlaneGeometry;
 use sheetsplat::internals::quad_plan::FramePlan;
 use sheetsplat::internals::reference::Geometry;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Method, Order, Ramp, TransferFunction, Window};
+use sheetsplat::settings::{Classification, Method, Order, Ramp, TransferFunction, Window};
 use sheetsplat::volume::Grid;
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat};
 
@@ -27,6 +31,22 @@ use crate::common::{Random, SPACINGS, camera, gpu, random_eye, scene};
 use crate::shade::place_error;
 use crate::{compute, contents, indirect, init};
 use rules::{Expected, Occluded, Rules};
+
+/// What groups are: some sheets each, or single planes (SPEC §9).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Groups {
+    Sheets(u32),
+    Planes,
+}
+
+impl Groups {
+    fn sheets(self) -> u32 {
+        match self {
+            Self::Sheets(sheets) => sheets,
+            Self::Planes => 1,
+        }
+    }
+}
 
 /// The stages with one list of bricks and the buffers that they read and write.
 pub(crate) struct Culling<'a> {
@@ -50,13 +70,13 @@ impl<'a> Culling<'a> {
     /// The stages for voxels in memory order, in a grid with these values and labels.
     pub(crate) fn new(
         gpu: &'a GpuHeadless,
-        (stage, sheets): (&'a Cull, u32),
+        (stage, kind): (&'a Cull, Groups),
         (grid, values, labels): (&Grid, &[f32], Option<&[u16]>),
         voxels: &[u32],
         transfer: &TransferFunction,
         scene: &Scene,
     ) -> Self {
-        let device = gpu.device();
+        let (device, sheets) = (gpu.device(), kind.sheets());
         let size = [scene.image.width, scene.image.height];
         let view = ViewGeometry::new(grid, &scene.camera, &scene.splatting, size).unwrap();
         let lists = BrickLists::upload(device, grid, voxels);
@@ -76,7 +96,13 @@ impl<'a> Culling<'a> {
         let frame = uniforms::frame(&view, &kernel, (grid, uploaded.format), &ramps, scene);
         let targets = Targets::new(device, size, TextureFormat::Rgba32Float, sheets).unwrap();
         let stride = device.limits().min_uniform_buffer_offset_alignment;
-        let group_bytes = uniforms::groups(&plan, &kernel, &scene.splatting, stride as usize);
+        let geometry = PlaneGeometry::new(&view, grid);
+        let group_bytes = match kind {
+            Groups::Sheets(_) => uniforms::groups(&plan, &kernel, &scene.splatting, stride as usize),
+            Groups::Planes => uniforms::plane_groups(&plan, &geometry, &scene.splatting, stride as usize),
+        };
+        let planes = uniforms::planes(&geometry, &view, uploaded.format, &Normalization::new([0.0, 1.0]));
+        let planes = init(device, &[planes], BufferUsages::UNIFORM);
         let groups = init(device, &group_bytes, BufferUsages::UNIFORM);
         let bytes = vec![0_u8; size_of::<Tally>() + targets.opaque_tiles.size() as usize];
         let culled = init(device, &bytes, BufferUsages::STORAGE);
@@ -92,7 +118,7 @@ impl<'a> Culling<'a> {
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
             culled: &culled,
-            planes: None,
+            planes: (kind == Groups::Planes).then_some(PlaneBuffers { planes: &planes, coefficients: None }),
         };
         let order = init(device, &plan.orders[0], BufferUsages::STORAGE);
         let counts = |group: &sheetsplat::internals::quad_plan::GroupPlan| {
@@ -158,7 +184,7 @@ struct Case {
     grid: Grid,
     voxels: Vec<u32>,
     scene: Scene,
-    sheets: u32,
+    kind: Groups,
 }
 
 /// Counts of events in a run, so that a test can require them.
@@ -192,7 +218,7 @@ impl Case {
         // Voxels whose decisions may differ in f32 are removed, which changes their bricks.
         for _ in 0..30 {
             let volume = (&self.grid, &values[..], None);
-            let culling = Culling::new(gpu, (stage, self.sheets), volume, &self.voxels, &transfer, &self.scene);
+            let culling = Culling::new(gpu, (stage, self.kind), volume, &self.voxels, &transfer, &self.scene);
             let (_, unsure) = self.expected(&culling, masks);
             if unsure.is_empty() {
                 return self.compare(&culling, masks);
@@ -210,7 +236,7 @@ impl Case {
             geometry: Geometry::new(&self.grid, &self.scene).unwrap(),
             kernel: Kernel::new(self.scene.splatting.radius, self.scene.splatting.falloff),
             order_of_sheets: self.scene.splatting.order,
-            sheets: self.sheets,
+            kind: self.kind,
             bricks: &culling.bricks,
             indices: &culling.indices,
             groups: &culling.groups,
@@ -234,7 +260,7 @@ impl Case {
         let mut visited_before = 0;
         for (group, expected) in steps.iter().enumerate() {
             let mask = &masks[group % masks.len()];
-            let name = format!("group {group} of {}, {} sheets", steps.len(), self.sheets);
+            let name = format!("group {group} of {}, {:?}", steps.len(), self.kind);
             gpu.queue().write_buffer(&targets.occluded, 0, bytemuck::cast_slice(&mask.words()));
             culling.cull(group);
 
@@ -253,8 +279,18 @@ impl Case {
             assert_eq!(counts[5..], [0; 3], "{name}: padding");
             let flags: Vec<u32> = (0..tiles.len() as u32).map(|tile| expected.tiles.contains(&tile).into()).collect();
             assert_eq!(tiles, flags, "{name}: tiles");
-            let splats = culling.splats();
-            for &id in &expected.drawn {
+            if self.kind == Groups::Planes {
+                // `tests/stages/after/values.rs` tests what else they hold.
+                let records: Vec<FieldVoxel> = contents(gpu, &list.splats);
+                for &id in &expected.drawn {
+                    let voxel = self.grid.voxel_at(culling.indices[id as usize]);
+                    let depth = culling.view.screen_from_voxel[2].dot(voxel.as_dvec3().extend(1.0));
+                    let off = (f64::from(records[id as usize].depth) - depth).abs();
+                    assert!(off <= 1e-4 * depth.abs().max(1.0), "{name}: {voxel} is {off} off {depth}");
+                }
+            }
+            let splats = if self.kind == Groups::Planes { Vec::new() } else { culling.splats() };
+            for &id in expected.drawn.iter().filter(|_| self.kind != Groups::Planes) {
                 let voxel = self.grid.voxel_at(culling.indices[id as usize]);
                 let record = splats[id as usize];
                 let found = DVec3::new(record.x_px.into(), record.y_px.into(), record.depth.into());
@@ -303,7 +339,7 @@ fn dense(random: &mut Random, sheets: u32, culling: bool) -> Case {
     scene.splatting.slab_width = [0.3, 1.0, 2.6][random.bits() as usize % 3];
     scene.splatting.radius = random.uniform(1.0, 3.0);
     scene.splatting.culling = culling;
-    Case { grid, voxels, scene, sheets }
+    Case { grid, voxels, scene, kind: Groups::Sheets(sheets) }
 }
 
 const SHEETS: [u32; 3] = [1, 2, 4];
@@ -360,6 +396,33 @@ fn any_eye_and_slices() {
     assert!(all.without_visits > 10 && all.with_some > 30, "{all:?}");
 }
 
+/// Groups that are planes, orthographic and with eyes anywhere: what is close to the eye has no place on the screen, and is always drawn.
+#[test]
+fn planes_of_any_eye() {
+    let gpu = gpu();
+    let mut random = Random(36);
+    let stage = Cull::of_planes(gpu.device());
+    let mut all = Seen::default();
+    for (at, spacing) in SPACINGS.into_iter().cycle().take(12).enumerate() {
+        let mut case = dense(&mut random, 1, true);
+        case.kind = Groups::Planes;
+        case.grid.spacing = spacing.into();
+        case.scene.splatting.classification = Classification::After;
+        case.scene.splatting.order = random.pick(&[Order::FrontToBack, Order::FrontToBack, Order::BackToFront]);
+        if at % 3 > 0 {
+            case.scene.camera = random_eye(&mut random, &case.grid);
+        }
+        let masks = masks(&mut random, [case.scene.image.width, case.scene.image.height]);
+        let seen = case.check(&gpu, &stage, &masks);
+        all.drawn += seen.drawn;
+        all.without_visits += seen.without_visits;
+        all.with_some += seen.with_some;
+        all.hidden_for_good += seen.hidden_for_good;
+    }
+    println!("{all:?}");
+    assert!(all.drawn > 10_000 && all.hidden_for_good > 1000 && all.with_some > 30, "{all:?}");
+}
+
 /// Without culling the occlusion buffer is not used: only what lies off the screen is left out.
 #[test]
 fn culling_off() {
@@ -399,7 +462,7 @@ fn many_bricks() {
         scene.camera = camera([0.04, 0.9, -0.03], height);
         scene.splatting.slab_width = 8.0;
         let masks = masks(&mut random, [150, 77]);
-        let case = Case { grid, voxels: chosen.into_iter().collect(), scene, sheets };
+        let case = Case { grid, voxels: chosen.into_iter().collect(), scene, kind: Groups::Sheets(sheets) };
         let seen = case.check(&gpu, &stage, &masks);
         assert!(seen.most_bricks > least && seen.drawn > 1000, "{seen:?}");
     }

@@ -12,7 +12,7 @@ use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::settings::{Method, Order};
 use sheetsplat::volume::Grid;
 
-use super::{ABSENT, indices};
+use super::{ABSENT, Groups, indices};
 use crate::common::{F32, Random};
 
 /// An upper bound on the f32 errors of pixel coordinates and depths in these tests: sums of numbers below 600. Close to an eye pixel
@@ -133,7 +133,7 @@ pub(super) struct Rules<'a> {
     pub(super) geometry: Geometry,
     pub(super) kernel: Kernel,
     pub(super) order_of_sheets: Order,
-    pub(super) sheets: u32,
+    pub(super) kind: Groups,
     pub(super) bricks: &'a [Brick],
     pub(super) indices: &'a [u32],
     pub(super) groups: &'a [SheetGroup],
@@ -162,6 +162,12 @@ impl Rules<'_> {
         sides.into_iter().all(|side| side)
     }
 
+    /// Whether what is this far from the eye has no place on the screen, but bears on planes (`CLOSE` of the shaders).
+    fn is_close(&self, decisions: &mut Decisions, from_eye: f64) -> bool {
+        let reach = 1.001 * f64::from(self.frame.reach);
+        self.kind == Groups::Planes && self.frame.near > 0.0 && decisions.at_least(reach, from_eye, EPSILON)
+    }
+
     fn visits(
         &self,
         decisions: &mut Decisions,
@@ -179,13 +185,22 @@ impl Rules<'_> {
         // The shader adds this slack.
         let reach = spread + f64::from(self.frame.reach) + 1e-3;
         let near = f64::from(group.near);
-        let far = near + f64::from(self.sheets) * f64::from(self.frame.slab_width);
+        let far = match self.kind {
+            Groups::Sheets(sheets) => near + f64::from(sheets) * f64::from(self.frame.slab_width),
+            Groups::Planes => near,
+        };
         let is_before = decisions.at_least(near, depth + reach, EPSILON);
         let is_behind = decisions.at_least(depth - reach, far, EPSILON);
+        if is_before || is_behind {
+            return false;
+        }
+        if self.is_close(decisions, from_eye - thickness) {
+            return true;
+        }
         let is_clipped = decisions.at_least(self.frame.near.into(), from_eye + thickness, EPSILON);
         let Some(bounds) = self.view.bounds(middle, half) else { return false };
         let (low, high) = (bounds.low - 1e-3, bounds.high + 1e-3);
-        if is_before || is_behind || is_clipped || !self.is_on_screen(decisions, group, low, high) {
+        if is_clipped || !self.is_on_screen(decisions, group, low, high) {
             return false;
         }
         if group.culling == 0 {
@@ -241,6 +256,10 @@ impl Rules<'_> {
     /// The number of a voxel's sections that the group draws, by the f64 evaluation: those with a footprint whose own box contains a pixel.
     fn sections(&self, decisions: &mut Decisions, voxel: UVec3, group: &SheetGroup) -> u32 {
         let Geometry { method, eye, .. } = self.geometry;
+        if self.kind == Groups::Planes {
+            let depth = self.view.screen_from_voxel[2].dot(voxel.as_dvec3().extend(1.0));
+            return u32::from(!decisions.at_least((depth - f64::from(group.near)).abs(), self.view.reach, EPSILON));
+        }
         if eye.is_some_and(|eye| !decisions.at_least(self.geometry.depth(voxel), eye.near, EPSILON)) {
             return 0;
         }
@@ -253,7 +272,7 @@ impl Rules<'_> {
                 Method::ImageAligned => self.geometry.slabs(&splat(depth), self.kernel.radius()),
                 _ => self.geometry.slice(voxel)..self.geometry.slice(voxel) + 1,
             };
-            sheets.start.max(first)..sheets.end.min(first + self.sheets as i32)
+            sheets.start.max(first)..sheets.end.min(first + self.kind.sheets() as i32)
         };
         decisions.unsure |= within(depth - EPSILON) != within(depth + EPSILON);
         let (half_group, epsilon) = (half_box(group), decisions.pixels);
@@ -283,10 +302,13 @@ impl Rules<'_> {
         let size = self.frame.size;
         let p = self.project(voxel.as_dvec3());
         let center = DVec2::new(p.x, p.y);
-        let is_on_screen = self.is_on_screen(decisions, group, center, center);
-        let [first, last] = decisions.filter(size, group, center, center);
-        let corners = [first, [last[0], first[1]], [first[0], last[1]], last];
-        let is_hidden = group.culling == 1 && corners.into_iter().all(|corner| occluded.at(corner));
+        let is_close = self.is_close(decisions, p.w);
+        let is_on_screen = is_close || self.is_on_screen(decisions, group, center, center);
+        let is_hidden = !is_close && group.culling == 1 && {
+            let [first, last] = decisions.filter(size, group, center, center);
+            let corners = [first, [last[0], first[1]], [first[0], last[1]], last];
+            corners.into_iter().all(|corner| occluded.at(corner))
+        };
         let state = &mut so_far.states[brick as usize];
         if !is_on_screen || is_hidden {
             // Back to front, where nothing is hidden, boxes may grow.
@@ -302,8 +324,10 @@ impl Rules<'_> {
         so_far.counts[0] += u32::from(state.1 >> slot & 1 == 0);
         state.1 |= 1 << slot;
         // Every tile with a pixel whose centre is in the footprint's box, plus at most one more row or column of tiles.
-        let low = decisions.pixel(center - half_box(group) - 0.5, size).map(|pixel| pixel / TILE);
-        let high = decisions.pixel(center + half_box(group), size).map(|pixel| pixel / TILE);
+        let half = if is_close { DVec2::splat(1e9) } else { half_box(group) };
+        let center = if is_close { DVec2::ZERO } else { center };
+        let low = decisions.pixel(center - half - 0.5, size).map(|pixel| pixel / TILE);
+        let high = decisions.pixel(center + half, size).map(|pixel| pixel / TILE);
         let columns = tile_grid(size)[0];
         so_far.tiles.extend((low[1]..=high[1]).flat_map(|y| (low[0]..=high[0]).map(move |x| y * columns + x)));
     }

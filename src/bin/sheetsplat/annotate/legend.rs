@@ -29,7 +29,7 @@ struct Entry {
 /// The legend in as many columns as needed for a height of at most `room` pixels.
 pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction, room: u32) -> Result<Image, Failure> {
     let entries =
-        if volume.further().is_empty() { entries(volume, transfer)? } else { channels(scene, volume, transfer) };
+        if volume.further().is_empty() { entries(volume, transfer)? } else { channels(scene, volume, transfer)? };
     let rows = (room.saturating_sub(2 * PADDING) / LINE).max(1).min(entries.len() as u32);
     let columns: Vec<&[Entry]> = entries.chunks(rows as usize).collect();
     let text_of = |column: &[Entry]| column.iter().map(|entry| text_width(&entry.text)).max().unwrap_or(0);
@@ -51,46 +51,58 @@ pub(super) fn plate(scene: &Scene, volume: &Volume, transfer: &TransferFunction,
     Ok(plate)
 }
 
-/// The channels that show something, each with its colours over the values that it shows.
-fn channels(scene: &Scene, volume: &Volume, transfer: &TransferFunction) -> Vec<Entry> {
+/// The channels that show something, each with its colours over the values that it shows; in place of a label map, its labels.
+fn channels(scene: &Scene, volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, Failure> {
     let entry = |(number, (channel, transfer)): (usize, (&Volume, &TransferFunction))| {
-        let [low, high] = shown_range(channel, transfer)?;
+        let Some([low, high]) = shown_range(channel, transfer) else { return Vec::new() };
+        if channel.labels().is_none() && categories::is_label_map(channel) {
+            return labels(channel, transfer, &categories::values(channel).unwrap_or_default());
+        }
         let value = |x: u32| low + (high - low) * f64::from(x) / f64::from(PATCH[0] - 1);
         let color = |x: u32| transfer.color.at(value(x)).as_vec3().extend(1.0).to_array();
         let text = shortened(&scene.channel_name(volume, number));
-        Some(Entry { text, colors: (0..PATCH[0]).map(color).collect() })
+        vec![Entry { text, colors: (0..PATCH[0]).map(color).collect() }]
     };
-    volume.channels().zip(transfer.channels()).enumerate().filter_map(entry).collect()
+    let entries: Vec<Entry> = volume.channels().zip(transfer.channels()).enumerate().flat_map(entry).collect();
+    if entries.is_empty() {
+        return refused("no channel with an opacity above 0", "visible channels");
+    }
+    Ok(entries)
+}
+
+/// The labels of a label map that show.
+fn labels(volume: &Volume, transfer: &TransferFunction, labels: &[u16]) -> Vec<Entry> {
+    let shown = labels.iter().filter(|&&label| transfer.alpha(f64::from(label), f64::INFINITY) > 0.0);
+    shown.map(|&label| entry(volume, transfer, label, [f64::from(label); 2])).collect()
+}
+
+/// A label with its colours over values.
+fn entry(volume: &Volume, transfer: &TransferFunction, label: u16, values: [f64; 2]) -> Entry {
+    let table = transfer.tables(Some(label));
+    let place = |x: u32| f64::from(x) / f64::from(PATCH[0] - 1);
+    let colors = (0..PATCH[0]).map(|x| table.color.at(values[0] * (1.0 - place(x)) + values[1] * place(x)));
+    let name = volume.label_names().get(&label).map_or_else(String::new, |name| format!(" {}", shortened(name)));
+    Entry { text: format!("{label}{name}"), colors: colors.map(|rgb| rgb.as_vec3().extend(1.0).to_array()).collect() }
+}
+
+fn refused<T>(found: &str, allowed: &str) -> Result<T, Failure> {
+    Err(Failure::Input(format!("--annotate: legend: found {found}, allowed: {allowed}")))
 }
 
 fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, Failure> {
-    let entry = |label: u16, values: [f64; 2]| {
-        let table = transfer.tables(Some(label));
-        let place = |x: u32| f64::from(x) / f64::from(PATCH[0] - 1);
-        let colors = (0..PATCH[0]).map(|x| table.color.at(values[0] * (1.0 - place(x)) + values[1] * place(x)));
-        let name = volume.label_names().get(&label).map_or_else(String::new, |name| format!(" {}", shortened(name)));
-        Entry {
-            text: format!("{label}{name}"),
-            colors: colors.map(|rgb| rgb.as_vec3().extend(1.0).to_array()).collect(),
-        }
-    };
-    let refused = |found: &str, allowed: &str| {
-        Err(Failure::Input(format!("--annotate: legend: found {found}, allowed: {allowed}")))
-    };
     let entries: Vec<Entry> = match volume.labels() {
         Some(labels) => {
             let values = shown_range(volume, transfer).unwrap_or_default();
             let has_color =
                 |label: &u16| transfer.labels.get(label).is_some_and(|tables| tables.visible && tables.color.is_some());
             let present = categories::distinct(labels);
-            present.into_iter().filter(has_color).map(|label| entry(label, values)).collect()
+            present.into_iter().filter(has_color).map(|label| entry(volume, transfer, label, values)).collect()
         }
         None => match categories::values(volume) {
-            Some(labels) => {
-                let shown = labels.into_iter().filter(|&label| transfer.alpha(f64::from(label), f64::INFINITY) > 0.0);
-                shown.map(|label| entry(label, [f64::from(label); 2])).collect()
+            Some(values) => labels(volume, transfer, &values),
+            None => {
+                return refused("a volume without labels", "label maps, segmented volumes and several channels");
             }
-            None => return refused("a volume without labels", "label maps and segmented volumes"),
         },
     };
     if entries.is_empty() {
@@ -100,7 +112,7 @@ fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, F
 }
 
 /// A name of bounded length.
-fn shortened(name: &str) -> String {
+pub(super) fn shortened(name: &str) -> String {
     match name.char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}...", &name[..end]),
         None => name.to_owned(),

@@ -28,8 +28,8 @@ const PLATE: [f32; 4] = [0.0, 0.0, 0.0, 0.75];
 /// The choice of annotations.
 #[derive(clap::Args)]
 pub(crate) struct Annotate {
-    /// Draw over the image, separated by commas: scale, a bar of a round length; colors, the colour of each value; legend, the
-    /// colour of each label.
+    /// Draw over the image, separated by commas: scale, a bar of a round length; colors, the colour of each value, for
+    /// each channel; legend, the colour of each label or channel.
     #[arg(long, value_name = "LIST", value_enum, value_delimiter = ',')]
     annotate: Vec<Annotation>,
 }

@@ -58,6 +58,8 @@ struct Info {
     unit: Option<String>,
     /// Of the file.
     channels: u32,
+    /// The names of the channels that are read, where known.
+    channel_names: Vec<Option<String>>,
     /// Whether voxels have colours of their own, whose luminances the values are.
     colors: bool,
     /// Of the file.
@@ -118,6 +120,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         spacing: opened.grid().spacing.to_array(),
         unit: volume.unit().map(str::to_owned),
         channels: encoding.map_or(1, |encoding| encoding.channels).max(volume.channels().count() as u32),
+        channel_names: volume.channels().map(|channel| channel.channel_name().map(str::to_owned)).collect(),
         colors: volume.colors().is_some(),
         times: encoding.map_or(1, |encoding| encoding.times),
         levels: Some(levels(&opened)).filter(|levels| !levels.is_empty()),

@@ -16,7 +16,7 @@ use sheetsplat::scene::{ImageSettings, Scene};
 use sheetsplat::settings::{Camera, Extent, TransferFunction, navigation};
 use sheetsplat::volume::Volume;
 
-use super::channels::Channels;
+use super::channels::{Change, Channels};
 use super::editor::Editor;
 use super::guest::Guest;
 use super::histogram::{Histogram, extent};
@@ -114,16 +114,21 @@ impl App {
     }
 
     fn panel(&mut self, ui: &mut Ui) {
-        ui.heading("Transfer function");
+        match self.channels.are_several() {
+            true => ui.heading(format!("Transfer function of {}", self.channels.edited_name())),
+            false => ui.heading("Transfer function"),
+        };
         let before = self.editor.points().to_vec();
         plot::show(ui, &mut self.editor, &self.histogram);
         if before != self.editor.points() {
-            self.transfer = self.editor.apply(&self.transfer);
+            let edited = self.channels.edited_of(&mut self.transfer);
+            *edited = self.editor.apply(edited);
         }
         if self.channels.are_several() {
             ui.separator();
             ui.heading("Channels");
-            self.channels.show(ui, &self.transfer);
+            let change = self.channels.show(ui, &mut self.transfer);
+            self.follow(change);
         }
         ui.separator();
         ui.heading("Splatting");
@@ -153,6 +158,21 @@ impl App {
         ui.label(&self.saved);
         if let Some(problem) = &self.problem {
             ui.colored_label(Color32::LIGHT_RED, problem);
+        }
+    }
+
+    /// Makes the editor follow a change in the list of channels, and the histogram where another channel is edited.
+    fn follow(&mut self, change: Option<Change>) {
+        let edited = self.channels.edited_of(&mut self.transfer);
+        match change {
+            Some(Change::Edited) => {
+                let volume = self.guest.volume();
+                let values = volume.channel(self.channels.edited()).unwrap_or(volume).values();
+                self.editor = Editor::new(edited, extent(values));
+                self.histogram = Histogram::new(values, self.editor.range());
+            }
+            Some(Change::Color) => self.editor = Editor::new(edited, self.editor.range()),
+            None => {}
         }
     }
 
@@ -251,7 +271,7 @@ impl App {
         let mut scene = Scene { image, camera: self.camera([width, height]), ..self.scene.clone() };
         if self.channels.are_several() {
             scene = scene.explicit(self.guest.volume());
-            self.channels.note(&mut scene);
+            self.channels.note(&mut scene, &self.transfer);
         }
         let result = screenshot::save_scene(&scene, &self.transfer, self.guest.volume(), &path);
         self.saved = saved(&path, &result);

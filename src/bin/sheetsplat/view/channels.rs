@@ -1,13 +1,33 @@
-//! The list of channels in the panel (SPEC §10): their names in their colours, each with a box that shows or hides it.
+//! The list of channels in the panel (SPEC §10): each with a box that shows or hides it, its colour, and its name, which gives the editor its transfer function.
 
 use eframe::egui::{Color32, RichText, Ui};
+use glam::DVec3;
+use sheetsplat::appearance::categories;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Ramp, TransferFunction};
 use sheetsplat::volume::Volume;
 
-/// The names of a volume's channels, and whether each is shown.
+/// A volume's channels as the panel shows them.
 pub(super) struct Channels {
-    rows: Vec<(String, bool)>,
+    rows: Vec<Row>,
+    /// The number of the channel whose transfer function is edited.
+    edited: usize,
+}
+
+struct Row {
+    name: String,
+    is_shown: bool,
+    /// Whether one colour may stand for the channel: not for colours of voxels, nor for those of labels.
+    has_color: bool,
+}
+
+/// What the user changed in the list, beside what is shown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Change {
+    /// Another channel is edited.
+    Edited,
+    /// The edited channel has another colour.
+    Color,
 }
 
 impl Channels {
@@ -16,8 +36,12 @@ impl Channels {
         // Without settings of its own a channel has the scene's.
         let of = |number: usize| if scene.further.is_empty() { 0 } else { number };
         let is_shown = |number| scene.channels().nth(of(number)).is_none_or(|channel| channel.visible);
-        let row = |number| (scene.channel_name(volume, number), is_shown(number));
-        Self { rows: (0..volume.channels().count()).map(row).collect() }
+        let row = |(number, channel): (usize, &Volume)| Row {
+            name: scene.channel_name(volume, number),
+            is_shown: is_shown(number),
+            has_color: channel.colors().is_none() && !categories::is_label_map(channel),
+        };
+        Self { rows: volume.channels().enumerate().map(row).collect(), edited: 0 }
     }
 
     /// The transfer functions of all channels, hidden ones too.
@@ -33,36 +57,81 @@ impl Channels {
         self.rows.len() > 1
     }
 
+    /// The number of the channel whose transfer function is edited.
+    pub(super) fn edited(&self) -> usize {
+        self.edited
+    }
+
+    /// The name of that channel.
+    pub(super) fn edited_name(&self) -> &str {
+        self.rows.get(self.edited).map_or("", |row| &row.name)
+    }
+
+    /// The transfer function of that channel.
+    pub(super) fn edited_of<'a>(&self, transfer: &'a mut TransferFunction) -> &'a mut TransferFunction {
+        of_channel(transfer, self.edited)
+    }
+
     /// The list.
-    pub(super) fn show(&mut self, ui: &mut Ui, transfer: &TransferFunction) {
-        for ((name, is_shown), of) in self.rows.iter_mut().zip(transfer.channels()) {
+    pub(super) fn show(&mut self, ui: &mut Ui, transfer: &mut TransferFunction) -> Option<Change> {
+        let Self { rows, edited } = self;
+        let mut change = None;
+        for (number, row) in rows.iter_mut().enumerate() {
+            let of = of_channel(transfer, number);
             let color = of.color.points().last().map(|(_, color)| *color).unwrap_or_default();
-            let [red, green, blue] = (color * 255.0).to_array().map(|channel| channel.round() as u8);
-            ui.checkbox(is_shown, RichText::new(name.as_str()).color(Color32::from_rgb(red, green, blue)));
+            let mut srgb = (color * 255.0).to_array().map(|channel| channel.round() as u8);
+            let [red, green, blue] = srgb;
+            ui.horizontal(|ui| {
+                ui.checkbox(&mut row.is_shown, "");
+                if row.has_color && ui.color_edit_button_srgb(&mut srgb).changed() {
+                    recolor(of, DVec3::from_array(srgb.map(f64::from)) / 255.0);
+                    change = change.or((*edited == number).then_some(Change::Color));
+                }
+                let name = RichText::new(&row.name).color(Color32::from_rgb(red, green, blue));
+                if ui.selectable_label(*edited == number, name).clicked() && *edited != number {
+                    *edited = number;
+                    change = Some(Change::Edited);
+                }
+            });
         }
+        change
     }
 
     /// Transfer functions without those of hidden channels.
     pub(super) fn shown(&self, transfer: &TransferFunction) -> TransferFunction {
         let mut shown = transfer.clone();
         let Ok(nothing) = Ramp::new(vec![(0.0, 0.0)]) else { return shown };
-        let hide = |of: &mut TransferFunction, (_, is_shown): &(String, bool)| {
-            if !is_shown {
-                of.opacity = nothing.clone();
-                of.labels.clear();
-            }
-        };
-        let (first, further) = self.rows.split_at(self.rows.len().min(1));
-        first.iter().for_each(|row| hide(&mut shown, row));
-        shown.further.iter_mut().zip(further).for_each(|(of, row)| hide(of, row));
+        for (number, _) in self.rows.iter().enumerate().filter(|(_, row)| !row.is_shown) {
+            let of = of_channel(&mut shown, number);
+            of.opacity = nothing.clone();
+            of.labels.clear();
+        }
         shown
     }
 
-    /// Notes in a scene that states every channel which are shown.
-    pub(super) fn note(&self, scene: &mut Scene) {
+    /// Notes in a scene that states every channel which are shown, and their transfer functions.
+    pub(super) fn note(&self, scene: &mut Scene, transfer: &TransferFunction) {
         let (first, further) = self.rows.split_at(self.rows.len().min(1));
-        first.iter().for_each(|(_, is_shown)| scene.visible = *is_shown);
-        scene.further.iter_mut().zip(further).for_each(|(channel, (_, is_shown))| channel.visible = *is_shown);
+        first.iter().for_each(|row| scene.visible = row.is_shown);
+        for ((channel, row), of) in scene.further.iter_mut().zip(further).zip(&transfer.further) {
+            (channel.visible, channel.transfer) = (row.is_shown, of.clone().into());
+        }
+    }
+}
+
+/// The transfer function of a channel.
+fn of_channel(transfer: &mut TransferFunction, number: usize) -> &mut TransferFunction {
+    match number {
+        0 => transfer,
+        _ => &mut transfer.further[number - 1],
+    }
+}
+
+/// Gives all values of a channel one colour.
+fn recolor(transfer: &mut TransferFunction, color: DVec3) {
+    let at = transfer.color.points().first().map_or(0.0, |point| point.0);
+    if let Ok(ramp) = Ramp::new(vec![(at, color)]) {
+        transfer.color = ramp;
     }
 }
 
@@ -71,23 +140,75 @@ impl Channels {
 mod tests {
     use std::path::Path;
 
+    use eframe::egui::{Context, Event, Modifiers, PointerButton, Pos2, RawInput, Rect, pos2, vec2};
+
     use super::*;
 
-    #[test]
-    fn hidden_channels_have_no_opacity_and_come_back() {
+    /// Three channels, of which the first is hidden.
+    fn three() -> (Scene, Volume) {
         let channel = "[[channel]]\nvolume.builtin = 'head:12'\n";
         let text = format!("{channel}visible = false\nname = 'first'\n{channel}{channel}");
         let scene = Scene::parse(&text, "test", Path::new(""), &[]).unwrap();
         let volume = scene.load_volume().unwrap();
+        (scene, volume)
+    }
+
+    #[test]
+    fn hidden_channels_have_no_opacity_and_come_back() {
+        let (scene, volume) = three();
         let mut channels = Channels::new(&scene, &volume);
-        assert_eq!(channels.rows[0], ("first".to_owned(), false));
-        channels.rows[2].1 = false;
+        assert_eq!((channels.rows[0].name.as_str(), channels.rows[0].is_shown), ("first", false));
+        channels.rows[2].is_shown = false;
         let all = Channels::transfer(&scene, &volume);
         let shown = channels.shown(&all);
         let opacities = |of: &TransferFunction| of.channels().map(|of| of.alpha(1e6, 0.0) > 0.0).collect::<Vec<_>>();
         assert_eq!((opacities(&all), opacities(&shown)), (vec![true; 3], vec![false, true, false]));
-        let mut noted = scene.clone();
-        channels.note(&mut noted);
+        let mut noted = scene.explicit(&volume);
+        channels.note(&mut noted, &all);
         assert_eq!((noted.visible, noted.further[0].visible, noted.further[1].visible), (false, true, false));
+        assert_eq!(noted.further[1].transfer.opacity.as_ref(), Some(&all.further[1].opacity));
+    }
+
+    #[test]
+    fn a_click_on_a_name_edits_that_channel() {
+        let (scene, volume) = three();
+        let mut channels = Channels::new(&scene, &volume);
+        let mut transfer = Channels::transfer(&scene, &volume);
+        let before = transfer.clone();
+        let context = Context::default();
+        let mut changes = Vec::new();
+        let mut show = |events: Vec<Event>| {
+            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, vec2(300.0, 200.0)));
+            let input = RawInput { screen_rect, events, ..RawInput::default() };
+            let _ = context.run_ui(input, |ui| changes.extend(channels.show(ui, &mut transfer)));
+        };
+        show(Vec::new());
+        // Names stand to the right of boxes and colours, one below the other.
+        for y in (2..150).step_by(6) {
+            let pos = pos2(90.0, y as f32);
+            let button = |pressed| {
+                let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+                Event::PointerButton { pos, button, pressed, modifiers }
+            };
+            show(vec![Event::PointerMoved(pos), button(true)]);
+            show(vec![button(false)]);
+        }
+        // The first one is edited already; each of the others once.
+        assert_eq!((changes, channels.edited), (vec![Change::Edited; 2], 2));
+        assert_eq!(channels.edited_name(), "channel 2");
+        assert!(transfer == before, "nothing else changes");
+        channels.edited_of(&mut transfer).iso_ranges = Some(vec![[1.0, 2.0]]);
+        assert!(transfer.further[1].iso_ranges.is_some() && transfer.further[0] == before.further[0]);
+    }
+
+    #[test]
+    fn a_channel_takes_one_colour() {
+        let (scene, volume) = three();
+        let mut transfer = Channels::transfer(&scene, &volume);
+        let before = transfer.clone();
+        recolor(of_channel(&mut transfer, 1), DVec3::X);
+        assert!([-5.0, 0.0, 300.0].iter().all(|&value| transfer.further[0].color.at(value) == DVec3::X));
+        assert_eq!(transfer.further[0].opacity, before.further[0].opacity);
+        assert!(transfer.color == before.color && transfer.further[1] == before.further[1]);
     }
 }

@@ -136,7 +136,94 @@ fn angles(direction: DVec3) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
+    use eframe::egui::{Context, Event, Modifiers, PointerButton, Pos2, RawInput, Rect, Shape, vec2};
+
     use super::*;
+
+    /// The panel in a context without a window.
+    #[derive(Default)]
+    struct Panel {
+        context: Context,
+        settings: Splatting,
+    }
+
+    impl Panel {
+        /// Shows a frame after some events, and returns its texts and where they are.
+        fn frame(&mut self, events: Vec<Event>) -> Vec<(String, Rect)> {
+            let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, vec2(400.0, 900.0)));
+            let input = RawInput { screen_rect, events, ..RawInput::default() };
+            let settings = &mut self.settings;
+            let output = self.context.run_ui(input, |ui| splatting(ui, settings));
+            let mut texts = Vec::new();
+            output.shapes.iter().for_each(|clipped| collect(&clipped.shape, &mut texts));
+            texts
+        }
+
+        /// Clicks the text, which the panel must show once.
+        fn click(&mut self, text: &str) {
+            let texts = self.frame(Vec::new());
+            let found: Vec<&(String, Rect)> = texts.iter().filter(|(shown, _)| shown == text).collect();
+            let [(_, place)] = found[..] else { panic!("{text:?}, {} times among {texts:?}", found.len()) };
+            let pos = place.center();
+            let pressed = |pressed| Event::PointerButton {
+                pos,
+                button: PointerButton::Primary,
+                pressed,
+                modifiers: Modifiers::NONE,
+            };
+            for event in [Event::PointerMoved(pos), pressed(true), pressed(false)] {
+                self.frame(vec![event]);
+            }
+            // Lists open a frame later.
+            self.frame(Vec::new());
+        }
+
+        fn shows(&mut self, text: &str) -> bool {
+            self.frame(Vec::new()).iter().any(|(shown, _)| shown == text)
+        }
+    }
+
+    fn collect(shape: &Shape, texts: &mut Vec<(String, Rect)>) {
+        match shape {
+            Shape::Text(text) => texts.push((text.galley.text().to_owned(), shape.visual_bounding_rect())),
+            Shape::Vec(shapes) => shapes.iter().for_each(|shape| collect(shape, texts)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn classification_is_switched_by_clicks() {
+        let mut panel = Panel::default();
+        assert_eq!(panel.settings.classification, Classification::Before);
+        assert!(panel.shows("classification") && !panel.shows("interpolation"));
+        panel.click("before");
+        panel.click("after");
+        assert_eq!(panel.settings.classification, Classification::After);
+        // Only then is there an interpolation to choose.
+        panel.click("smooth");
+        panel.click("exact");
+        assert_eq!(panel.settings.interpolation, Interpolation::Exact);
+        panel.click("after");
+        panel.click("before");
+        assert_eq!(panel.settings.classification, Classification::Before);
+        assert!(!panel.shows("interpolation"));
+    }
+
+    #[test]
+    fn other_methods_classify_before_splatting() {
+        let mut panel = Panel::default();
+        panel.settings.classification = Classification::After;
+        panel.click("image-aligned");
+        panel.click("axis-aligned");
+        panel.frame(Vec::new());
+        assert_eq!(
+            (panel.settings.method, panel.settings.classification),
+            (Method::AxisAligned, Classification::Before)
+        );
+        // The choice is shown, but cannot be made.
+        panel.click("before");
+        assert!(!panel.shows("after"));
+    }
 
     #[test]
     fn angles_are_those_of_the_direction() {

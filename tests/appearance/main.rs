@@ -2,21 +2,22 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[expect(dead_code, reason = "not every file needs all of it")]
+#[path = "../common/mod.rs"]
 mod common;
+mod drawn;
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::appearance::{Colormap, Preset, categories, shown_range};
+use sheetsplat::cpu;
 use sheetsplat::scene::{Scene, TransferSettings, VolumeSource};
-use sheetsplat::settings::Compositing;
-use sheetsplat::settings::Projection;
-use sheetsplat::settings::{Ramp, TransferFunction};
+use sheetsplat::settings::{Compositing, Economies, Projection, Ramp, TransferFunction};
 use sheetsplat::volume::{Labels, Volume, builtin};
 
 use common::shared::shared;
-use common::{Random, camera, gpu, scene};
+use common::{Random, gpu};
 
 fn builtin_scene(name: &str, sets: &[&str]) -> Scene {
     let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
@@ -205,34 +206,6 @@ fn labels_have_colours_of_their_own() {
     assert_eq!((transfer.alpha(0.0, 0.0), transfer.alpha(3.0, 0.0)), (0.0, 0.9));
 }
 
-/// Where 3 meets 5, all colours are mixtures of the two, without the colour of 4.
-#[test]
-fn the_border_of_two_labels_has_no_third_colour() {
-    let gpu = gpu();
-    let volume = three_five();
-    let mut scene = scene(90, 60);
-    scene.camera = camera([0.0, 1.0, 0.0], 20.0);
-    scene.shading.enabled = false;
-    let image = gpu.render_volume(volume, &scene).unwrap().image;
-    let [three, four, five] = [3, 4, 5].map(categories::color);
-    let normal = three.cross(five).normalize();
-    assert!(normal.dot(four).abs() > 0.1, "4 is no mixture");
-    let mut seen = [0; 3];
-    // The middle of the box, without the corner.
-    for y in 20..40 {
-        for x in 15..75 {
-            let [r, g, b, _] = image.pixels[y * 90 + x].map(f64::from);
-            let color = DVec3::new(r, g, b);
-            assert!(normal.dot(color).abs() < 1e-3, "{color} at {x} {y}");
-            seen[0] += u32::from(color.distance(three) < 0.02);
-            seen[1] += u32::from(color.distance(five) < 0.02);
-            seen[2] += u32::from(color.distance(three) > 0.1 && color.distance(five) > 0.1);
-        }
-    }
-    assert!(seen[0] > 300 && seen[1] > 300, "{seen:?}");
-    assert!(seen[2] < 20 * 9, "a wide border: {seen:?}");
-}
-
 #[test]
 fn the_labels_preset_colours_segments_too() {
     let volume = builtin::volume("head:24").unwrap();
@@ -312,66 +285,6 @@ fn a_colour_map_and_colours_are_one_thing() {
     };
     let [color, map] = ["transfer.color=[[0, [1, 1, 1]]]", "transfer.colormap=hot"];
     assert_eq!((of(&[color, map]), of(&[map, color])), ((false, Some(Colormap::Hot)), (true, None)));
-}
-
-#[test]
-fn an_xray_along_an_axis_reaches_white_and_no_more() {
-    let gpu = gpu();
-    for (name, direction) in
-        [("head:48", [0.0, 1.0, 0.0]), ("tomato:48", [1.0, 0.0, 0.0]), ("nerve:64", [0.0, 0.0, 1.0])]
-    {
-        let mut scene = builtin_scene(name, &["preset=xray", "image.width=80", "image.height=80"]);
-        scene.camera.direction = direction.into();
-        scene.camera.up = if direction[2] == 0.0 { DVec3::Z } else { DVec3::Y };
-        let image = gpu.render(&scene).unwrap().image;
-        let brightest = image.pixels.iter().map(|pixel| pixel[0]).fold(0.0, f32::max);
-        let saturated = image.pixels.iter().filter(|pixel| pixel[0] >= 1.0).count();
-        assert!(brightest > 0.35 && saturated < 80 * 80 / 50, "{name}: {brightest}, {saturated} pixels are white");
-        assert!(image.pixels.iter().all(|[r, g, b, _]| r == g && g == b), "{name}: no grey");
-    }
-}
-
-/// A bright ball behind a dim wall: the maximum along the ray shows through anything in front of it.
-#[test]
-fn a_mip_shows_the_brightest_value() {
-    let gpu = gpu();
-    let dims = UVec3::new(20, 24, 20);
-    let value = |index: u32| {
-        let p = UVec3::new(index % 20, index / 20 % 24, index / 480).as_dvec3();
-        match p {
-            p if p.distance(DVec3::new(9.5, 17.0, 9.5)) < 4.5 => 200.0,
-            p if (3.0..7.0).contains(&p.y) => 80.0,
-            _ => 0.0,
-        }
-    };
-    let volume = Volume::new("ball", dims, DVec3::ONE, (0..dims.element_product()).map(value).collect()).unwrap();
-    let mut scene = builtin_scene("cube:8", &["preset=mip", "image.width=40", "image.height=40"]);
-    scene.camera = camera([0.0, 1.0, 0.0], 20.0);
-    let image = gpu.render_volume(volume, &scene).unwrap().image;
-    let [ball, wall] = [20 * 40 + 20, 6 * 40 + 6].map(|at: usize| f64::from(image.pixels[at][0]));
-    assert!(ball > 0.9 && (0.3..0.5).contains(&wall), "{ball} {wall}");
-}
-
-#[test]
-fn every_preset_shows_something_of_every_builtin() {
-    let gpu = gpu();
-    for (preset, kind) in Preset::ALL {
-        for name in ["head:32", "tomato:32", "nerve:48"] {
-            if kind == Preset::Labels && name.starts_with("nerve") {
-                continue;
-            }
-            let scene = builtin_scene(name, &[&format!("preset={preset}"), "image.width=64", "image.height=64"]);
-            let rendering = gpu.render(&scene).unwrap();
-            let lit = rendering.image.pixels.iter().filter(|pixel| pixel[..3].iter().any(|&c| c > 0.1)).count();
-            // Without contrast agent few vessels are visible, and thin branches are faint in a sum.
-            let least = match kind {
-                Preset::CtVessels => 20,
-                Preset::Xray => 40,
-                _ => 80,
-            };
-            assert!(lit > least, "{preset} of {name}: {lit} pixels");
-        }
-    }
 }
 
 /// Scenes that together use every kind of setting.
@@ -470,6 +383,11 @@ fn an_explicit_scene_renders_the_same_bytes_without_choosing() {
         assert_eq!(read, explicit);
         let [first, second] = [&scene, &read].map(|scene| gpu.render_volume(volume.clone(), scene).unwrap().image);
         assert!(first == second, "{text}");
+        // The native backend has no economies.
+        if scene.splatting.experimental == Economies::default() {
+            let [first, second] = [&scene, &read].map(|scene| cpu::render(volume.clone(), scene).unwrap().image);
+            assert!(first == second, "natively: {text}");
+        }
     }
 }
 

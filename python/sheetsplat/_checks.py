@@ -1,0 +1,38 @@
+"""Checks of arguments, whose errors name the argument, what was found and what is allowed."""
+
+from __future__ import annotations
+
+import math
+import operator
+from typing import Any
+
+from .errors import SceneError, _Refused
+
+__all__ = ["finite", "refused", "whole"]
+
+
+def refused(kind: type[_Refused], key: str, found: object, allowed: str) -> _Refused:
+    """The error for an argument."""
+    return kind(f"{key}: found {found}, allowed: {allowed}", key, str(found), allowed)
+
+
+def whole(key: str, value: Any, low: int, high: int, kind: type[_Refused] = SceneError) -> int:
+    """A whole number within bounds."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or not low <= number <= high:
+        raise refused(kind, key, repr(value), f"a whole number from {low} to {high}")
+    return number
+
+
+def finite(key: str, value: Any, kind: type[_Refused] = SceneError) -> float:
+    """A finite number."""
+    try:
+        number = float(value)
+    except (TypeError, ValueError, OverflowError):
+        number = math.nan
+    if not math.isfinite(number):
+        raise refused(kind, key, repr(value), "a finite number")
+    return number

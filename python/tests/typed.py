@@ -1,0 +1,37 @@
+"""What type checkers see of the installed package: `mypy --strict python/tests/typed.py`. Nothing runs it."""
+
+from collections.abc import Iterator
+from typing import Any, assert_type
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sheetsplat
+from sheetsplat import Comparison, Image, Part, Scene, View, Volume
+
+
+def use(values: NDArray[np.int16]) -> None:
+    volume = Volume(values, spacing=(2, 1, 1), memory="1GiB")
+    assert_type(volume.shape, tuple[int, int, int])
+    assert_type(volume.values, NDArray[np.float32])
+    scene = Scene(camera={"up": [0, 0, 1]})
+    view = View(volume, scene=scene, backend="cpu")
+    assert_type(view.render(), Image)
+    assert_type(view.part(slabs=(0, 1)), Part)
+    assert_type(view.split(4), list[dict[str, Any]])
+    assert_type(view.orbit(count=3), Iterator[Image])
+    assert_type(sheetsplat.render(values).to_uint8(), NDArray[np.uint8])
+    assert_type(sheetsplat.compare(values, values), Comparison)
+    assert_type(sheetsplat.orbit(values, "turn.gif"), Iterator[Image] | None)
+    assert_type(sheetsplat.info("head.nrrd", spacing=2), dict[str, Any])
+    try:
+        scene.save("scene.toml")
+    except sheetsplat.FileError as error:
+        assert_type(error.errno, int | None)
+    except sheetsplat.SceneError as error:
+        assert_type(error.key, str | None)
+    # Each of these is an error, which `--strict` reports if it is none.
+    View(volume, backend=5)  # type: ignore[arg-type]
+    view.render().save("a.png", depth="8")  # type: ignore[arg-type]
+    Volume()  # type: ignore[call-arg]
+    sheetsplat.rendre(values)  # type: ignore[attr-defined]

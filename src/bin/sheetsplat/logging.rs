@@ -1,0 +1,83 @@
+//! The program's log on standard error: what `env_logger` writes, and the library's progress as a line on the terminal.
+
+use std::io::{IsTerminal, Write, stderr};
+
+use log::{LevelFilter, Log, Metadata, Record};
+use sheetsplat::internals::after::coefficients::PROGRESS;
+
+/// The log. Progress that the written log does not show is a line that every step rewrites and that disappears at the end.
+struct ProgramLog {
+    written: env_logger::Logger,
+    is_progress_shown: bool,
+}
+
+/// Starts the log. Progress is shown if it is wanted and standard error is a terminal.
+pub(crate) fn start(filter: &str, is_progress_wanted: bool) {
+    let written = env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).build();
+    let is_progress_shown = is_progress_wanted && stderr().is_terminal();
+    let level = if is_progress_shown { written.filter().max(LevelFilter::Info) } else { written.filter() };
+    // There is no other log.
+    if log::set_boxed_logger(Box::new(ProgramLog { written, is_progress_shown })).is_ok() {
+        log::set_max_level(level);
+    }
+}
+
+impl ProgramLog {
+    fn is_line(&self, metadata: &Metadata<'_>) -> bool {
+        self.is_progress_shown && metadata.target() == PROGRESS && !self.written.enabled(metadata)
+    }
+}
+
+impl Log for ProgramLog {
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        self.is_line(metadata) || self.written.enabled(metadata)
+    }
+
+    fn log(&self, record: &Record<'_>) {
+        if self.is_line(record.metadata()) {
+            // A closed terminal does not end the program.
+            let _ = stderr().lock().write_all(line(&record.args().to_string()).as_bytes());
+        } else {
+            self.written.log(record);
+        }
+    }
+
+    fn flush(&self) {
+        self.written.flush();
+    }
+}
+
+/// What is written to the terminal for a message: it takes the place of the one before, and nothing is left of the last one.
+fn line(message: &str) -> String {
+    let shown = if message.ends_with(" 100 %") { "" } else { message };
+    format!("\r\x1b[K{shown}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn log(filter: &str) -> ProgramLog {
+        let written = env_logger::Builder::new().parse_filters(filter).build();
+        ProgramLog { written, is_progress_shown: true }
+    }
+
+    fn info(target: &str) -> Metadata<'_> {
+        Metadata::builder().level(log::Level::Info).target(target).build()
+    }
+
+    #[test]
+    fn progress_is_a_line_unless_it_is_written() {
+        let quiet = log("error,sheetsplat=warn");
+        assert!(quiet.is_line(&info(PROGRESS)) && quiet.enabled(&info(PROGRESS)));
+        assert!(!quiet.is_line(&info("sheetsplat::volume")) && !quiet.enabled(&info("sheetsplat::volume")));
+        let verbose = log("error,sheetsplat=info");
+        assert!(!verbose.is_line(&info(PROGRESS)) && verbose.enabled(&info(PROGRESS)));
+    }
+
+    #[test]
+    fn the_line_disappears_at_the_end() {
+        assert_eq!(line("coefficients: 30 %"), "\r\x1b[Kcoefficients: 30 %");
+        assert_eq!(line("coefficients: 100 %"), "\r\x1b[K");
+    }
+}

@@ -1,0 +1,13 @@
+//! Work on every core, by rayon. A page's WebAssembly has a single thread, and its code must be short: there the same calls are loops, without a scheduler.
+
+#[cfg(target_arch = "wasm32")]
+mod sequential;
+
+#[cfg(all(feature = "cpu", not(target_arch = "wasm32")))]
+pub(crate) use rayon::{ThreadPool, ThreadPoolBuilder};
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) use rayon::{current_num_threads, prelude};
+#[cfg(all(feature = "cpu", target_arch = "wasm32"))]
+pub(crate) use sequential::{ThreadPool, ThreadPoolBuilder};
+#[cfg(target_arch = "wasm32")]
+pub(crate) use sequential::{current_num_threads, prelude};

@@ -1,0 +1,224 @@
+//! What the library uses of rayon, as loops over iterators. Results are those of rayon, since no result depends on the number of threads (SPEC §12).
+#![cfg_attr(not(feature = "cpu"), expect(dead_code, reason = "some are only used by the native backend"))]
+
+use std::convert::Infallible;
+use std::iter::{Enumerate, Filter, FilterMap, FlatMap, Map, StepBy, Zip};
+use std::slice::{Chunks, ChunksMut, Iter, IterMut};
+
+pub(crate) mod prelude {
+    pub(crate) use super::{IntoLoop as _, Slice as _, SliceMut as _, VecExtend as _};
+}
+
+pub(crate) fn current_num_threads() -> usize {
+    1
+}
+
+/// An iterator with rayon's names. Those whose meaning is the standard library's come from [`Iterator`]; the ones here return a loop again, or take
+/// other arguments than there.
+pub(crate) struct Loop<I>(I);
+
+impl<I: Iterator> Iterator for Loop<I> {
+    type Item = I::Item;
+
+    fn next(&mut self) -> Option<I::Item> {
+        self.0.next()
+    }
+
+    fn size_hint(&self) -> (usize, Option<usize>) {
+        self.0.size_hint()
+    }
+}
+
+impl<I: Iterator> Loop<I> {
+    pub(crate) fn map<T, F: FnMut(I::Item) -> T>(self, f: F) -> Loop<Map<I, F>> {
+        Loop(self.0.map(f))
+    }
+
+    pub(crate) fn filter<F: FnMut(&I::Item) -> bool>(self, f: F) -> Loop<Filter<I, F>> {
+        Loop(self.0.filter(f))
+    }
+
+    pub(crate) fn filter_map<T, F: FnMut(I::Item) -> Option<T>>(self, f: F) -> Loop<FilterMap<I, F>> {
+        Loop(self.0.filter_map(f))
+    }
+
+    pub(crate) fn flat_map_iter<T: IntoIterator, F: FnMut(I::Item) -> T>(self, f: F) -> Loop<FlatMap<I, T, F>> {
+        Loop(self.0.flat_map(f))
+    }
+
+    pub(crate) fn enumerate(self) -> Loop<Enumerate<I>> {
+        Loop(self.0.enumerate())
+    }
+
+    pub(crate) fn zip<T: IntoIterator>(self, other: T) -> Loop<Zip<I, T::IntoIter>> {
+        Loop(self.0.zip(other))
+    }
+
+    pub(crate) fn step_by(self, step: usize) -> Loop<StepBy<I>> {
+        Loop(self.0.step_by(step))
+    }
+
+    pub(crate) fn with_min_len(self, _: usize) -> Self {
+        self
+    }
+
+    pub(crate) fn map_init<S, T>(
+        self,
+        init: impl FnOnce() -> S,
+        mut f: impl FnMut(&mut S, I::Item) -> T,
+    ) -> Loop<impl Iterator<Item = T>> {
+        let mut state = init();
+        Loop(self.0.map(move |item| f(&mut state, item)))
+    }
+
+    pub(crate) fn for_each_init<S>(self, init: impl FnOnce() -> S, mut f: impl FnMut(&mut S, I::Item)) {
+        let mut state = init();
+        self.0.for_each(|item| f(&mut state, item));
+    }
+
+    /// The only partial result.
+    pub(crate) fn fold<T>(self, start: impl FnOnce() -> T, f: impl FnMut(T, I::Item) -> T) -> Loop<std::iter::Once<T>> {
+        Loop(std::iter::once(self.0.fold(start(), f)))
+    }
+
+    pub(crate) fn reduce(self, start: impl FnOnce() -> I::Item, f: impl FnMut(I::Item, I::Item) -> I::Item) -> I::Item {
+        self.0.fold(start(), f)
+    }
+
+    pub(crate) fn reduce_with(self, f: impl FnMut(I::Item, I::Item) -> I::Item) -> Option<I::Item> {
+        self.0.reduce(f)
+    }
+
+    pub(crate) fn try_reduce<T, R: Tried<T>>(mut self, start: impl FnOnce() -> T, f: impl Fn(T, T) -> R) -> R
+    where
+        I: Iterator<Item = R>,
+    {
+        let mut result = start();
+        for item in &mut self.0 {
+            match item.tried().and_then(|item| f(result, item).tried()) {
+                Ok(next) => result = next,
+                Err(failure) => return failure,
+            }
+        }
+        R::of(result)
+    }
+}
+
+/// An [`Option`] or a [`Result`].
+pub(crate) trait Tried<T>: Sized {
+    /// The value, or what says that there is none.
+    fn tried(self) -> Result<T, Self>;
+
+    fn of(value: T) -> Self;
+}
+
+impl<T> Tried<T> for Option<T> {
+    fn tried(self) -> Result<T, Self> {
+        self.ok_or(None)
+    }
+
+    fn of(value: T) -> Self {
+        Some(value)
+    }
+}
+
+impl<T, E> Tried<T> for Result<T, E> {
+    fn tried(self) -> Result<T, Self> {
+        self.map_err(Err)
+    }
+
+    fn of(value: T) -> Self {
+        Ok(value)
+    }
+}
+
+pub(crate) trait IntoLoop: IntoIterator + Sized {
+    fn into_par_iter(self) -> Loop<Self::IntoIter> {
+        Loop(self.into_iter())
+    }
+}
+
+impl<T: IntoIterator> IntoLoop for T {}
+
+pub(crate) trait Slice<T> {
+    fn par_iter(&self) -> Loop<Iter<'_, T>>;
+    fn par_chunks(&self, size: usize) -> Loop<Chunks<'_, T>>;
+}
+
+impl<T> Slice<T> for [T] {
+    fn par_iter(&self) -> Loop<Iter<'_, T>> {
+        Loop(self.iter())
+    }
+
+    fn par_chunks(&self, size: usize) -> Loop<Chunks<'_, T>> {
+        Loop(self.chunks(size))
+    }
+}
+
+pub(crate) trait SliceMut<T> {
+    fn par_iter_mut(&mut self) -> Loop<IterMut<'_, T>>;
+    fn par_chunks_mut(&mut self, size: usize) -> Loop<ChunksMut<'_, T>>;
+    fn par_sort_unstable(&mut self)
+    where
+        T: Ord;
+    fn par_sort_unstable_by_key<K: Ord>(&mut self, key: impl FnMut(&T) -> K);
+}
+
+impl<T> SliceMut<T> for [T] {
+    fn par_iter_mut(&mut self) -> Loop<IterMut<'_, T>> {
+        Loop(self.iter_mut())
+    }
+
+    fn par_chunks_mut(&mut self, size: usize) -> Loop<ChunksMut<'_, T>> {
+        Loop(self.chunks_mut(size))
+    }
+
+    fn par_sort_unstable(&mut self)
+    where
+        T: Ord,
+    {
+        self.sort_unstable();
+    }
+
+    fn par_sort_unstable_by_key<K: Ord>(&mut self, key: impl FnMut(&T) -> K) {
+        self.sort_unstable_by_key(key);
+    }
+}
+
+pub(crate) trait VecExtend<T> {
+    fn par_extend(&mut self, items: impl IntoIterator<Item = T>);
+}
+
+impl<T> VecExtend<T> for Vec<T> {
+    fn par_extend(&mut self, items: impl IntoIterator<Item = T>) {
+        self.extend(items);
+    }
+}
+
+/// Threads, of which there are none: work is done where it is handed over.
+#[derive(Debug)]
+pub(crate) struct ThreadPool;
+
+impl ThreadPool {
+    #[expect(clippy::unused_self, reason = "rayon's threads belong to a pool")]
+    pub(crate) fn spawn(&self, work: impl FnOnce()) {
+        work();
+    }
+}
+
+pub(crate) struct ThreadPoolBuilder;
+
+impl ThreadPoolBuilder {
+    pub(crate) fn new() -> Self {
+        Self
+    }
+
+    pub(crate) fn num_threads(self, _: usize) -> Self {
+        self
+    }
+
+    #[expect(clippy::unnecessary_wraps, reason = "rayon's may fail")]
+    pub(crate) fn build(self) -> Result<ThreadPool, Infallible> {
+        Ok(ThreadPool)
+    }
+}
