@@ -244,6 +244,7 @@ impl GpuHeadless {
             height,
             counts,
             store: None,
+            peak_rss_mib: None,
             rasterizer: view.rasterizer().unwrap_or_default().to_owned(),
             stages_ms,
             gpu_bytes: view.gpu_bytes() + target_bytes,

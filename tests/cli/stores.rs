@@ -19,12 +19,12 @@ const STREAMED: &str = "--memory 500000B --level 0 --set image={width=40,height=
 fn array(shape: [usize; 3], codecs: Value, is_sharded: bool) -> Value {
     let endian = json!({"name": "bytes", "configuration": {"endian": "little"}});
     let shards = json!([{"name": "sharding_indexed", "configuration": {
-        "chunk_shape": [CHUNK; 3], "codecs": codecs, "index_codecs": [endian], "index_location": "end",
+        "chunk_shape": vec![CHUNK; 3], "codecs": codecs, "index_codecs": [endian], "index_location": "end",
     }}]);
     let outer = if is_sharded { 2 * CHUNK } else { CHUNK };
     json!({
         "zarr_format": 3, "node_type": "array", "shape": shape, "data_type": "uint8", "fill_value": 0,
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [outer; 3]}},
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": vec![outer; 3]}},
         "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
         "codecs": if is_sharded { shards } else { codecs },
     })
@@ -45,7 +45,7 @@ fn write(folder: &Folder, codecs: &Value, is_sharded: bool) {
         fs::write(path, bytes).unwrap();
     };
     let axes = ["z", "y", "x"].map(|name| json!({"name": name, "type": "space"}));
-    let dataset = |path: &str, scale: f64| json!({"path": path, "coordinateTransformations": [{"type": "scale", "scale": [scale; 3]}]});
+    let dataset = |path: &str, scale: f64| json!({"path": path, "coordinateTransformations": [{"type": "scale", "scale": vec![scale; 3]}]});
     let group = json!({"zarr_format": 3, "node_type": "group", "attributes": {"ome": {
         "version": "0.5", "multiscales": [{"axes": axes, "datasets": [dataset("0", 1.0), dataset("1", 4.0)]}],
     }}});
