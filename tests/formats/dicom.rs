@@ -421,7 +421,13 @@ fn wrong_elements() {
     let deflated = open("jpeg-lossless.dcm", "1.2.4.70", "1.2.1.99");
     assert_refused(deflated, "a.dcm", "elements", "deflate", "an undamaged deflated stream");
     let floats = open("float.dcm", "MONOCHROME2", "MONOCHROME1");
-    assert_refused(floats, "a.dcm", "PhotometricInterpretation", "MONOCHROME1", "MONOCHROME1 for whole numbers");
+    assert_refused(
+        floats,
+        "a.dcm",
+        "PhotometricInterpretation",
+        "MONOCHROME1",
+        "MONOCHROME1 or PALETTE COLOR for whole numbers",
+    );
     assert_refused(open("rle.dcm", "1.2.5\0", "1.2.1\0"), "a.dcm", "PixelData", "fragments", "bare samples");
     assert_refused(open("frames.dcm", "DICM", "DICN"), "a.dcm", "magic", "DICN", "DICM after 128 bytes");
     assert_refused(open("frames.dcm", "1.2.1\0", "1.2.5\0"), "a.dcm", "PixelData", "bare samples", "frames as the");
