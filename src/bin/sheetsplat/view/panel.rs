@@ -153,7 +153,9 @@ mod tests {
             let screen_rect = Some(Rect::from_min_size(Pos2::ZERO, vec2(400.0, 900.0)));
             let input = RawInput { screen_rect, events, ..RawInput::default() };
             let settings = &mut self.settings;
-            let output = self.context.run_ui(input, |ui| splatting(ui, settings));
+            let mut output = self.context.run_ui(input, |ui| splatting(ui, settings));
+            // Nothing is drawn.
+            output.textures_delta.clear();
             let mut texts = Vec::new();
             output.shapes.iter().for_each(|clipped| collect(&clipped.shape, &mut texts));
             texts
