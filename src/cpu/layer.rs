@@ -221,12 +221,14 @@ mod tests {
             let List::After(coefficients) = &renderer.layers[0].list else { unreachable!() };
             coefficients[0].places()
         };
-        let [first_bricks, first_ranges] = places(&[(60.0, 0.0), (100.0, 0.5)]);
+        let first = places(&[(60.0, 0.0), (100.0, 0.5)]);
+        let ([first_bricks, first_ranges], first_count) = first;
         assert!(first_bricks.is_some() && first_ranges.is_some());
         // The same values have an opacity.
-        assert_eq!(places(&[(60.0, 0.0), (80.0, 0.1), (120.0, 0.9)]), [first_bricks, first_ranges]);
-        let [bricks, ranges] = places(&[(150.0, 0.0), (180.0, 0.9)]);
-        assert_ne!(bricks, first_bricks);
+        assert_eq!(places(&[(60.0, 0.0), (80.0, 0.1), (120.0, 0.9)]), first);
+        // The memory of the old list may be the new one's.
+        let ([_, ranges], count) = places(&[(150.0, 0.0), (180.0, 0.9)]);
+        assert!(0 < count && count < first_count, "{count} of {first_count}");
         assert_eq!(ranges, first_ranges);
     }
 }

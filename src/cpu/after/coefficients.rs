@@ -138,11 +138,13 @@ impl Coefficients {
         self.shown.as_ref().map_or(&[], |shown| shown.bricks.bricks())
     }
 
-    /// Where the lists of bricks and their ranges lie in memory.
+    /// Where the lists of bricks and their ranges lie in memory, and the number of bricks.
     #[cfg(test)]
-    pub(in crate::cpu) fn places(&self) -> [Option<*const ()>; 2] {
-        let bricks = self.shown.as_ref().map(|shown| shown.bricks.bricks().as_ptr().cast());
-        [bricks, self.ranges.as_ref().map(|ranges| ranges.of_kernels.place())]
+    pub(in crate::cpu) fn places(&self) -> ([Option<*const ()>; 2], usize) {
+        let bricks = self.shown.as_ref().map(|shown| shown.bricks.bricks());
+        let places =
+            [bricks.map(|bricks| bricks.as_ptr().cast()), self.ranges.as_ref().map(|ranges| ranges.of_kernels.place())];
+        (places, bricks.map_or(0, <[_]>::len))
     }
 
     /// For the last view that was looked at, the bricks, as indices into the grid's, in whose cells rays may enter a slab with an opacity.
