@@ -278,7 +278,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             }
             let ray = sheet_depths(at, depths);
             var composited = Composited(image, vec4u(), vec4f(), FAR, false);
-            var sheet = vec4f(0.0);
+            var sheets_of_channels = ChannelSum();
             for (var channel = 0u; channel < CHANNELS; channel += 1u) {
                 see_channel(channel);
                 let drawn = plane_sample(pixel, at);
@@ -315,7 +315,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                         now = composited.carried;
                         color_now = composited.carried_color;
                     } else {
-                        sheet += sheet_of(slab, light);
+                        sheets_of_channels = with_channel(sheets_of_channels, sheet_of(slab, light));
                     }
                 }
                 carried[channel * pixels + slot] = with_sample(now, drawn);
@@ -324,7 +324,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 }
             }
             if !is_by_means() {
-                composited = composite_sheet(sheet, part_of(ray, near, far), image);
+                composited = composite_sheet(total(sheets_of_channels), part_of(ray, near, far), image);
             }
             if composited.is_changed {
                 acc[slot] = composited.image;

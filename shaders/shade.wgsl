@@ -24,10 +24,11 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     let p = project(voxel);
     let light = lighting(p.xy, frame.near > 0.0);
     // A voxel's footprint is the same in all channels, so their amounts are drawn as one (SPEC §10).
-    var sum = amount_in_channel(voxel, 0u, light);
-    for (var channel = 1u; channel < CHANNELS; channel += 1u) {
-        sum += amount_in_channel(voxel, channel, light);
+    var channels = ChannelSum();
+    for (var channel = 0u; channel < CHANNELS; channel += 1u) {
+        channels = with_channel(channels, amount_in_channel(voxel, channel, light));
     }
+    let sum = total(channels);
     splats[id] = Splat(p.x, p.y, p.z, p.w, pack2x16float(sum.rg), pack2x16float(sum.ba));
 }
 

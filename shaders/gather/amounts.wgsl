@@ -8,7 +8,7 @@
 // Needs gather/voxels.wgsl: ScreenBox, count_drawn, sheets_here.
 // Needs gather/walk.wgsl: SearchBounds.
 // Needs shared/brick.wgsl: BRICK_VOXELS, voxel_of.
-// Needs shared/channels.wgsl: CHANNELS.
+// Needs shared/channels.wgsl: CHANNELS, ChannelSum, total, with_channel.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: sections_on_screen.
 // Needs shared/own_color.wgsl: own_color.
@@ -85,14 +85,16 @@ struct Shaded {
 // The sums over all channels (SPEC §10), in which a voxel's footprint is the same.
 fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
     read_channel(0u);
-    var sum = shaded_first(voxel, p);
+    let first = shaded_first(voxel, p);
+    var channels = with_channel(ChannelSum(), first.amount);
+    var alpha = first.alpha;
     for (var channel = 1u; channel < CHANNELS; channel += 1u) {
         read_channel(channel);
         let further = shaded_further(voxel, channel, p);
-        sum.amount += further.amount;
-        sum.alpha += further.alpha;
+        channels = with_channel(channels, further.amount);
+        alpha += further.alpha;
     }
-    return sum;
+    return Shaded(total(channels), alpha);
 }
 
 // In a channel after the first.
