@@ -300,7 +300,8 @@ impl TileBuffers<BufferSpec> {
             1 => None,
             _ => Some(within("the bricks of the tile rasterizer", brick_bytes)?),
         };
-        let gathered = results.hits_byte() + request.hit_bytes();
+        // The stage that joins channels' images binds first hits even where there are none.
+        let gathered = results.hits_byte() + request.hit_bytes().max(size_of::<u32>() as u64);
         let gathered = within("the tile rasterizer's counts and first hits", gathered)?;
         let words = |words: usize| words as u64 * 4;
         let range_bytes = (request.bands.len() * range_stride(limits)) as u64;

@@ -222,7 +222,9 @@ fn one_channel_is_a_scene_of_one_volume() {
                 gpu.render(&scene).unwrap().image
             });
             assert_eq!(first, second, "{classification:?} {compositing:?} by {rasterizer:?}");
-            assert!(first.pixels.iter().any(|pixel| pixel[0] > 0.1));
+            // The least values are those of the air.
+            let shows_air = compositing == Compositing::Minimum;
+            assert!(shows_air || first.pixels.iter().any(|pixel| pixel[0] > 0.1), "{classification:?} {compositing:?}");
         }
     }
 }
@@ -299,7 +301,8 @@ fn picks_are_those_of_the_native_backend() {
             }
             // Rounding decides at rims, and between a voxel and its neighbour.
             assert!(agreeing * 20 >= all * 19, "{what}: {agreeing} of {all} picks agree");
-            assert!(channels[0] + channels[1] > 10, "{what}: {channels:?}");
+            // An average may nowhere be as opaque.
+            assert!(compositing == Compositing::Average || channels[0] + channels[1] > 10, "{what}: {channels:?}");
         }
     }
 }
@@ -383,10 +386,10 @@ fn memory_grows_with_the_channels() {
             gpu.render_volume(volume, &scene).unwrap().stats.gpu_bytes
         });
         let what = format!("{classification:?} {compositing:?}: {used:?} bytes");
-        // The buffers that join images come with the second channel.
+        // The buffers that join images come with the second channel. Channels show different bricks.
         let joined = 20 * 32 * 32 + 1024;
         for (count, &used_by) in (1..).zip(&used) {
-            assert!(used_by <= count * used[0] + joined, "{what}");
+            assert!(used_by <= count * used[0] * 21 / 20 + joined, "{what}");
         }
         assert!(used.is_sorted(), "{what}");
     }
