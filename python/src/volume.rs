@@ -134,6 +134,7 @@ impl Volume {
     /// chooses a level that is left open, or the finest is taken. The spacing, in the order z, y, x, and the labels of an array go before the file's.
     #[staticmethod]
     #[pyo3(signature = (path, memory, selection, scene, bytes_read, changes=None, index=None))]
+    #[expect(clippy::too_many_arguments, reason = "the package's Python part passes its own")]
     fn open(
         py: Python<'_>,
         path: PathBuf,

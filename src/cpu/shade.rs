@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::material::Material;
 use super::vector::{LANES, optical_depth, power};
-use crate::settings::shading::{Light, Shading};
+use crate::settings::shading::{Light, MAX_SHADING, Shading};
 use crate::settings::splatting::Compositing;
 
 /// Up to eight voxels to be shaded, by lane.
@@ -57,16 +57,17 @@ pub(super) struct Shader {
 
 impl Shader {
     pub(super) fn new(shading: &Shading, compositing: Compositing) -> Self {
+        let capped = |weight: f64| weight.min(MAX_SHADING) as f32;
         Self {
             is_enabled: shading.enabled,
             to_light: match shading.light {
                 Light::Headlight => None,
                 Light::Direction(direction) => Some(direction.normalize().as_vec3().to_array()),
             },
-            ambient: shading.ambient as f32,
-            diffuse: shading.diffuse as f32,
-            specular: shading.specular as f32,
-            shininess: shading.shininess as f32,
+            ambient: capped(shading.ambient),
+            diffuse: capped(shading.diffuse),
+            specular: capped(shading.specular),
+            shininess: capped(shading.shininess),
             is_optical_depth: compositing == Compositing::Exponential,
         }
     }

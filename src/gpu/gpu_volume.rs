@@ -184,10 +184,6 @@ impl GpuVolume {
         if let Some(kept) = self.kept_coefficients().as_ref().filter(|kept| kept.kernel == kernel) {
             return Ok(kept.channels.clone());
         }
-        #[cfg_attr(
-            target_family = "wasm",
-            expect(clippy::arc_with_non_send_sync, reason = "a browser's wgpu belongs to one thread")
-        )]
         let of_channel = |channel: &Volume| Coefficients::of_channel(channel, kernel).map(Arc::new);
         let channels = self.shared.volume.channels().map(of_channel).collect::<Result<Vec<_>, _>>()?;
         *self.kept_coefficients() = Some(ChannelCoefficients { kernel, channels: channels.clone() });

@@ -14,11 +14,59 @@ macro_rules! shader {
         Shader {
             stage: $stage,
             files: &[
-                $((concat!($file, ".wgsl"), include_str!(concat!("../../shaders/", $file, ".wgsl"))),)*
-                (concat!($stage, ".wgsl"), include_str!(concat!("../../shaders/", $stage, ".wgsl"))),
+                $((concat!($file, ".wgsl"), text!($file)),)*
+                (concat!($stage, ".wgsl"), text!($stage)),
             ],
         }
     };
+}
+
+/// The text of a file.
+#[cfg(not(target_arch = "wasm32"))]
+macro_rules! text {
+    ($file:expr) => {
+        include_str!(concat!("../../shaders/", $file, ".wgsl"))
+    };
+}
+
+/// The text of a file without comments, because a page's code must be short. Lines stay, so that messages name the right ones.
+#[cfg(target_arch = "wasm32")]
+macro_rules! text {
+    ($file:expr) => {{
+        const TEXT: &str = include_str!(concat!("../../shaders/", $file, ".wgsl"));
+        const CODE: ([u8; TEXT.len()], usize) = comments::without(TEXT);
+        const BYTES: [u8; CODE.1] = comments::first(&CODE.0);
+        match std::str::from_utf8(&BYTES) {
+            Ok(code) => code,
+            Err(_) => panic!("comments end at characters"),
+        }
+    }};
+}
+
+#[cfg(target_arch = "wasm32")]
+mod comments {
+    /// The bytes of a text without its comments, and their number. WGSL has no strings.
+    pub(super) const fn without<const N: usize>(text: &str) -> ([u8; N], usize) {
+        let (text, mut code, mut count, mut at, mut is_comment) = (text.as_bytes(), [0; N], 0, 0, false);
+        while at < N {
+            is_comment = text[at] != b'\n' && (is_comment || text[at] == b'/' && at + 1 < N && text[at + 1] == b'/');
+            if !is_comment {
+                code[count] = text[at];
+                count += 1;
+            }
+            at += 1;
+        }
+        (code, count)
+    }
+
+    pub(super) const fn first<const N: usize>(bytes: &[u8]) -> [u8; N] {
+        let (mut first, mut at) = ([0; N], 0);
+        while at < N {
+            first[at] = bytes[at];
+            at += 1;
+        }
+        first
+    }
 }
 
 /// Finds the bricks that a sheet group visits.

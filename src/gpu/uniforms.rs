@@ -20,13 +20,10 @@ use crate::lists::patch_bins::PatchBins;
 use crate::lists::quad_plan::FramePlan;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
-use crate::settings::shading::{Light, MIN_GRADIENT, Shading};
+use crate::settings::shading::{Light, MAX_SHADING, MIN_GRADIENT, Shading};
 use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::Window;
 use crate::volume::Grid;
-
-/// The cap of ambient, diffuse, specular and shininess, beyond which images no longer change. It avoids infinities in `f32`.
-const MAX_SHADING: f64 = 1e30;
 
 /// The constants of a frame, for a volume with this grid and format of values.
 pub fn frame(

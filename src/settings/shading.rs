@@ -27,6 +27,9 @@ pub enum Gradient {
     Kernel,
 }
 
+/// The cap of ambient, diffuse, specular and shininess, beyond which images no longer change. It avoids infinities in `f32`.
+pub(crate) const MAX_SHADING: f64 = 1e30;
+
 /// Two-sided Phong shading with white highlights, computed in the unwarped space (§4.2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shading {

@@ -11,7 +11,7 @@ const SHAPE: [usize; 3] = [48, 48, 64];
 const CHUNK: usize = 16;
 
 /// A limit that the values do not fit into, and an opaque object, of which the chunks at x = 0 are seen.
-const STREAMED: &str = "--memory 500000B --level 0 --set image={width=40,height=30} --set camera.fit=volume \
+const STREAMED: &str = "--memory 500000B --level 0 --set image={width=80,height=60} --set camera.fit=volume \
                         --set camera.direction=[1,0,0] --set transfer={color=[[0,[1,1,1]]],opacity=[[0,0.9],[255,1]]} \
                         --set splatting.classification=before";
 
@@ -103,11 +103,9 @@ fn damaged_chunks_are_named() {
         for backend in ["cpu", "gpu"] {
             render(&folder, backend, " --stats stats.json").assert_success();
             let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
-            assert_eq!(
-                (stats["chunks_total"].as_u64(), stats["chunks_read"].as_u64()),
-                (Some(36), Some(36)),
-                "{backend}"
-            );
+            let [total, read] = ["chunks_total", "chunks_read"].map(|key| stats[key].as_u64().unwrap());
+            // Some are hidden.
+            assert!(total == 36 && (18..=36).contains(&read), "{backend}: {read} of {total}");
             // Not the sample's, which is of the other level.
             assert_eq!(stats["sample_chunks_read"].as_u64(), Some(1), "{stats}");
             fs::remove_file(folder.path("image.npy")).unwrap();
