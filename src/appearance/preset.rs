@@ -1,6 +1,6 @@
 //! Presets: a transfer function for a kind of data, with matching shading and compositing.
 
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 
 use super::colormap::Colormap;
 use super::hounsfield::Hounsfield;
@@ -228,14 +228,26 @@ pub(super) fn confocal_of_several(volume: &Volume) -> TransferFunction {
     haze(volume, |[start, top]| {
         let share = |value: f32| ((f64::from(value) - start) / (top - start)).clamp(0.0, 1.0);
         let sum: u64 = volume.values().par_iter().map(|&value| (share(value) * STEPS) as u64).sum();
-        let mean = sum as f64 / STEPS / volume.values().len() as f64;
+        let mean = sum as f64 / STEPS / (volume.values().len() as u64 - volume.holes()) as f64;
         (DEPTH / (mean * extent(volume))).min(MOST)
     })
 }
 
-/// The mean of a volume's sides, in its smallest spacing.
+/// The mean of a volume's sides without holes around it, in its smallest spacing.
 fn extent(volume: &Volume) -> f64 {
-    (volume.dims().as_dvec3() * volume.grid().aspect()).element_sum() / 3.0
+    (finite_dims(volume).as_dvec3() * volume.grid().aspect()).element_sum() / 3.0
+}
+
+/// The voxels along each axis of the box of the finite values.
+fn finite_dims(volume: &Volume) -> UVec3 {
+    if volume.holes() == 0 {
+        return volume.dims();
+    }
+    let finite = volume.values().par_iter().enumerate().filter(|(_, value)| !value.is_nan());
+    let voxels = finite.map(|(index, _)| volume.grid().voxel_at(index as u32)).map(|voxel| (voxel, voxel));
+    let join = |a: (UVec3, UVec3), b: (UVec3, UVec3)| (a.0.min(b.0), a.1.max(b.1));
+    let (low, high) = voxels.reduce(|| (UVec3::MAX, UVec3::ZERO), join);
+    high + 1 - low
 }
 
 /// [`confocal`] with the opacity at a window's end.
