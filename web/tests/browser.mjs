@@ -52,14 +52,14 @@ export async function page(browser, address, { inWorkers, ...options } = {}) {
     return { page: opened, faults };
 }
 
-/** The scenes of tests/goldens.rs as texts of scene files, with the sizes and channels of their goldens. */
+/** The scenes of tests/golden_scenes as texts of scene files, with the sizes and channels of their goldens. */
 export function goldens() {
-    const source = readFileSync(join(root, "tests", "goldens.rs"), "utf8");
-    const table = source.slice(source.indexOf("const SCENES"), source.indexOf("/// The scene of a row"));
+    const source = readFileSync(join(root, "tests", "golden_scenes", "mod.rs"), "utf8");
+    const table = source.slice(source.indexOf("const SCENES"));
     const text = String.raw`"((?:[^"\\]|\\[\s\S])*)"`;
     const count = Number(table.match(/; (\d+)\]/)[1]);
     const rows = [...table.matchAll(new RegExp(String.raw`\(\s*${text},\s*${text},\s*&\[([\s\S]*?)\],?\s*\)(?=,|\s*\])`, "g"))];
-    if (rows.length !== count) throw new Error(`tests/goldens.rs: found ${rows.length} of ${count} scenes`);
+    if (rows.length !== count) throw new Error(`tests/golden_scenes/mod.rs: found ${rows.length} of ${count} scenes`);
     const unescaped = (literal) => literal.replace(/\\\n\s*/g, "").replace(/\\(.)/g, "$1");
     return rows.map(([, name, volume, list]) => {
         const settings = [...list.matchAll(new RegExp(text, "g"))].map(([, literal]) => unescaped(literal));
