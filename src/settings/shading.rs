@@ -28,6 +28,7 @@ pub enum Gradient {
 }
 
 /// The cap of ambient, diffuse, specular and shininess, beyond which images no longer change. It avoids infinities in `f32`.
+#[cfg(any(feature = "cpu", feature = "gpu"))]
 pub(crate) const MAX_SHADING: f64 = 1e30;
 
 /// Two-sided Phong shading with white highlights, computed in the unwarped space (§4.2).
