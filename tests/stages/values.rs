@@ -17,6 +17,7 @@ use crate::{init, written};
 /// A shader that writes the bits of a value into every word of the result.
 const READ: &str = concat!(
     include_str!("../../shaders/shared/frame.wgsl"),
+    include_str!("../../shaders/shared/texels.wgsl"),
     include_str!("../../shaders/shared/volume.wgsl"),
     "
     @group(0) @binding(1) var values: texture_2d_array<u32>;
