@@ -40,7 +40,7 @@ fn streamed(store: impl Store + 'static, sample: &Volume) -> StreamedVolume {
 fn most_chunks_of_an_opaque_head_are_not_read() {
     let volume = head(256);
     let [first, end] = [12.0, 30.0];
-    let opacity = format!("transfer={{color=[[0,[1,0.9,0.8]]],opacity=[[{first},0],[{end},0.9]]}}");
+    let opacity = format!("transfer={{color=[[0,[1,0.9,0.8]]],opacity=[[{first},0],[{end},1]]}}");
     for (classification, most) in [("before", 0.6), ("after", 1.1)] {
         let scene = scene(&[
             &opacity,
