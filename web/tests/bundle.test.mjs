@@ -48,7 +48,7 @@ async function draws(address) {
         });
         assert.equal(await shown.evaluate(() => window.made.backend), backend);
         const stats = await shown.evaluate(() => window.made.render());
-        assert.ok(stats.voxels_shaded > 100, JSON.stringify(stats));
+        assert.ok(stats.sections_rasterized > 100, JSON.stringify(stats));
         assert.deepEqual(faults, []);
         await shown.context().close();
     }

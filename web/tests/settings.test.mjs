@@ -89,9 +89,12 @@ test("controls that are set back win over the scene", async () => {
     await shown.waitForFunction(async () => !(await window.view.scene()).includes("crop"));
     // The plane without sliders stays; nothing else of the scene does.
     await sceneHas(shown, /^planes = \[\[0\.0, 0\.0, 1\.0, 8\.0\]\]/);
-    await openScene(shown, "volume.builtin = \"head:24\"\nclip.planes = [[0.0, 0.0, 1.0, 8.0]]\n");
+    // A scene with a table of the camera shows the whole volume.
+    await openScene(shown, "volume.builtin = \"head:24\"\nclip.planes = [[0.0, 0.0, 1.0, 8.0]]\ncamera.fit = \"volume\"\n");
     const expected = await picture(shown);
     await openScene(shown, SCENE);
+    await shown.locator("summary", { hasText: "Splatting" }).evaluate((summary) => (summary.parentElement.open = true));
+    await shown.selectOption("#compositing", "");
     await shown.selectOption("#preset", "");
     await shown.selectOption("#colormap", "");
     await shown.locator("#slab-width").fill("1");
