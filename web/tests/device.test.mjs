@@ -118,7 +118,8 @@ test("where no other device opens, auto goes on drawing on the CPU", async () =>
     assert.deepEqual(await camera(shown), place);
     const after = await pixels();
     assert.equal(after.length, before.length);
-    const apart = after.filter((channel, at) => Math.abs(channel - before[at]) > 1).length;
+    // Culling may change a channel by one minus the opacity at which pixels count as opaque, 0.95.
+    const apart = after.filter((channel, at) => Math.abs(channel - before[at]) > 13).length;
     assert.ok(apart <= after.length * 0.002, `${apart} of ${after.length} bytes`);
     // The new canvas has the old one's place, focus and controls.
     assert.ok(await shown.evaluate(() => document.activeElement === window.view.canvas && window.view.canvas.id === "canvas"));
