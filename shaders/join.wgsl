@@ -17,7 +17,7 @@ override FIRST_HIT: bool = false;
 
 const JOIN_WORKGROUP = 256u;
 
-// The depth of a first hit; beyond every depth if there is none.
+// The depth of a first hit; `FAR`, which is beyond every depth, if the ray hits nothing.
 fn depth_of(hit: u32, point_px: vec2f) -> f32 {
     return select(depth_along_ray(point_px, bitcast<f32>(hit)), FAR, hit == 0u);
 }

@@ -80,7 +80,7 @@ fn main() {
     }
 }
 
-/// Prints how long the coefficients take: the least of three times, or of fewer after a second.
+/// Prints how long the coefficients take: the shortest of up to three runs, as many as begin within a second.
 fn time_coefficients() {
     for (name, (kernel_name, kernel)) in SOLVED.into_iter().flat_map(|name| KERNELS.map(|kernel| (name, kernel))) {
         let volume = builtin::volume(name).unwrap();

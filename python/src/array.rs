@@ -143,7 +143,7 @@ pub(crate) fn labels(array: &Bound<'_, PyAny>) -> Result<([u32; 3], Arc<[u16]>),
     Ok((sizes.dims(), labels))
 }
 
-/// The error for an array that is none of the types.
+/// The error for an array whose samples have an unsupported type.
 fn untyped(array: &Bound<'_, PyAny>) -> Raised {
     let found = array.getattr("dtype").and_then(|dtype| Ok(dtype.str()?.to_string()));
     error::volume("dtype", &found.unwrap_or_else(|_| "no array".to_owned()), "integers or floating-point numbers")

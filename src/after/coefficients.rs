@@ -30,7 +30,7 @@ pub const PROGRESS: &str = "sheetsplat::progress";
 /// The last solutions, so that a volume that is read again is not solved again. A volume keeps its own as long as it lives.
 static SOLVED: Mutex<Solutions> = Mutex::new(Solutions { last: VecDeque::new(), max_bytes: 128 << 20 });
 
-/// Solutions, the last one first, which together take at most so many bytes.
+/// The solutions that were used last, most recent first. Together they take at most `max_bytes`.
 #[derive(Debug)]
 struct Solutions {
     last: VecDeque<(Fingerprint, Arc<[f32]>)>,

@@ -174,7 +174,7 @@ fn solid(object: &Object) -> TransferFunction {
 /// Gray like glass, so that what glows within is seen: a surface, little in most of the object, and what is brighter, such as bone, denser again.
 fn glass(volume: &Volume, object: &Object) -> TransferFunction {
     /// Opacities times the volume's mean extent, so that volumes of any resolution let as much through.
-    const DEPTHS: [f64; 3] = [16.0, 0.5, 8.0];
+    const DEPTHS: [f64; 3] = [16.0, 1.5, 8.0];
     const MOST: f64 = 0.25;
     let [surface, inside, bright] = DEPTHS.map(|depth| (depth / extent(volume)).min(MOST));
     let threshold = object.threshold();

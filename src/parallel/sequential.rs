@@ -76,7 +76,7 @@ impl<I: Iterator> Loop<I> {
         self.0.for_each(|item| f(&mut state, item));
     }
 
-    /// The only partial result.
+    /// A loop over a single item: the result of folding all items, where rayon has one for each thread.
     pub(crate) fn fold<T>(self, start: impl FnOnce() -> T, f: impl FnMut(T, I::Item) -> T) -> Loop<std::iter::Once<T>> {
         Loop(std::iter::once(self.0.fold(start(), f)))
     }
@@ -106,7 +106,7 @@ impl<I: Iterator> Loop<I> {
 
 /// An [`Option`] or a [`Result`].
 pub(crate) trait Tried<T>: Sized {
-    /// The value, or what says that there is none.
+    /// The value, or `Err` with the `None` or the error itself.
     fn tried(self) -> Result<T, Self>;
 
     fn of(value: T) -> Self;
@@ -195,7 +195,7 @@ impl<T> VecExtend<T> for Vec<T> {
     }
 }
 
-/// Threads, of which there are none: work is done where it is handed over.
+/// A pool without threads: the caller does the work itself.
 #[derive(Debug)]
 pub(crate) struct ThreadPool;
 

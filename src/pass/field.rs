@@ -7,7 +7,8 @@ use wgpu::{
     TextureView,
 };
 
-use super::splat::{added_to, clear_bindings, clear_pipeline, quad_indices, record_quads, sheets_of_a_group};
+use super::clear::Clear;
+use super::splat::{added_to, quad_indices, record_quads, sheets_of_a_group};
 use crate::gpu::bindings::{Bindings, at_offset, storage, uniform};
 use crate::gpu::layout::{FieldPlanes, FieldVoxel, Frame, Indirect, SheetGroup};
 use crate::gpu::render_pipeline::render_pipeline;
@@ -21,8 +22,7 @@ pub const SHEETS_PER_PLANE: u32 = 2;
 /// The stage's pipelines: one that zeroes tiles, and those that draw.
 #[derive(Debug)]
 pub struct Field {
-    clear_bindings: Bindings,
-    clear: RenderPipeline,
+    clear: Clear,
     bindings: Bindings,
     format: TextureFormat,
     /// Indexed by gradient; each is compiled when it is first needed.
@@ -42,10 +42,8 @@ impl Field {
             ("args", storage::<Indirect>(ShaderStages::VERTEX, true)),
             ("planes", uniform::<FieldPlanes>(ShaderStages::VERTEX, false)),
         ];
-        let clear_bindings = clear_bindings(device);
         Self {
-            clear: clear_pipeline(device, &clear_bindings, format, SHEETS_PER_PLANE),
-            clear_bindings,
+            clear: Clear::new(device, format, SHEETS_PER_PLANE),
             bindings: Bindings::new(device, shaders::FIELD, &slots),
             format,
             field: Default::default(),
@@ -65,8 +63,7 @@ impl Field {
 
     /// Binds the list of tiles to zero.
     pub fn bind_clear(&self, device: &Device, frame: &Buffer, tiles: &Buffer) -> BindGroup {
-        let resources = [("frames", frame.as_entire_binding()), ("composited", tiles.as_entire_binding())];
-        self.clear_bindings.bind(device, &resources)
+        self.clear.bind(device, frame, tiles)
     }
 
     /// Binds one list's voxels. `groups` holds a [`SheetGroup`] at every dynamic offset that will be drawn.

@@ -8,7 +8,8 @@ use wgpu::{
     ShaderStages, TextureFormat, TextureView, TextureViewDimension,
 };
 
-use super::splat::{added_to, clear_bindings, clear_pipeline, quad_indices, record_quads, sheets_of_a_group};
+use super::clear::Clear;
+use super::splat::{added_to, quad_indices, record_quads, sheets_of_a_group};
 use crate::gpu::bindings::{Bindings, at_offset, storage, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, FieldPlanes, FieldVoxel, Frame, Indirect, SheetGroup};
 use crate::gpu::render_pipeline::render_pipeline;
@@ -18,8 +19,7 @@ use crate::pass::cull::CullList;
 /// The stage's pipelines: one that zeroes tiles, and those that draw.
 #[derive(Debug)]
 pub struct FieldColors {
-    clear_bindings: Bindings,
-    clear: RenderPipeline,
+    clear: Clear,
     bindings: Bindings,
     format: TextureFormat,
     /// Each is compiled when it is first needed.
@@ -75,10 +75,8 @@ impl FieldColors {
             ("bricks", storage::<Brick>(vertex, true)),
             ("colors", texture_of_integers(vertex, TextureViewDimension::D2Array)),
         ];
-        let clear_bindings = clear_bindings(device);
         Self {
-            clear: clear_pipeline(device, &clear_bindings, format, 1),
-            clear_bindings,
+            clear: Clear::new(device, format, 1),
             bindings: Bindings::new(device, shaders::FIELD_COLORS, &slots),
             format,
             pipelines: Mutex::default(),
@@ -103,8 +101,7 @@ impl FieldColors {
 
     /// Binds the list of tiles to zero.
     pub fn bind_clear(&self, device: &Device, frame: &Buffer, tiles: &Buffer) -> BindGroup {
-        let resources = [("frames", frame.as_entire_binding()), ("composited", tiles.as_entire_binding())];
-        self.clear_bindings.bind(device, &resources)
+        self.clear.bind(device, frame, tiles)
     }
 
     /// Binds one list's voxels. `groups` holds a [`SheetGroup`] at every dynamic offset that will be drawn.
@@ -141,7 +138,7 @@ impl FieldColors {
     ) {
         let lists: Vec<_> = lists.into_iter().collect();
         // Without lists the tiles are zeroed all the same.
-        let pipeline = lists.first().map_or(&self.clear, |(bound, ..)| &*bound.pipeline);
+        let pipeline = lists.first().map_or(&self.clear.pipeline, |(bound, ..)| &*bound.pipeline);
         let draws = lists.iter().map(|&(bound, offset, args)| (&bound.group, offset, args));
         let pass = ("sheetsplat.field_colors", timestamp_writes, std::slice::from_ref(sheet), &self.indices);
         record_quads(encoder, pass, (&self.clear, clear_group, tiles), pipeline, draws);

@@ -6,6 +6,7 @@
 //! Each stage holds its pipeline, makes its bind group, and records itself; none allocates, submits or waits while recording.
 
 pub mod classify;
+mod clear;
 pub mod composite;
 pub mod cull;
 pub mod field;

@@ -8,10 +8,11 @@ use wgpu::{
     TextureView, TextureViewDimension,
 };
 
+use super::clear::Clear;
 use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{Bindings, Slot, at_offset, storage, texture, uniform, uploaded};
 use crate::gpu::footprint_texture::FootprintTexture;
-use crate::gpu::layout::{Frame, Indirect, QUADS, SheetGroup, Splat as SplatRecord, TileList};
+use crate::gpu::layout::{Frame, Indirect, QUADS, SheetGroup, Splat as SplatRecord};
 use crate::gpu::render_pipeline::{Attachments, render_pipeline};
 use crate::gpu::shaders;
 use crate::pass::cull::CullList;
@@ -20,8 +21,7 @@ use crate::settings::splatting::FootprintForm;
 /// The stage's pipelines: one that zeroes tiles, and those that draw.
 #[derive(Debug)]
 pub struct Splat {
-    clear_bindings: Bindings,
-    clear: RenderPipeline,
+    clear: Clear,
     bindings: Bindings,
     format: TextureFormat,
     sheets: u32,
@@ -43,10 +43,8 @@ pub struct SplatMode {
 impl Splat {
     /// Compiles the stage for groups of `sheets` sheets, 1, 2 or 4, in the given format.
     pub fn new(device: &Device, format: TextureFormat, sheets: u32) -> Self {
-        let clear_bindings = clear_bindings(device);
         Self {
-            clear: clear_pipeline(device, &clear_bindings, format, sheets),
-            clear_bindings,
+            clear: Clear::new(device, format, sheets),
             bindings: Bindings::new(device, shaders::SPLAT, &splat_slots()),
             format,
             sheets,
@@ -60,15 +58,16 @@ impl Splat {
         self.cell(mode).get_or_init(|| {
             let additive = Some(added_to(wgpu::BlendFactor::One));
             let shader = if mode.perspective { shaders::SPLAT_PERSPECTIVE } else { shaders::SPLAT };
-            let entry = format!("fragment_{}", self.sheets);
+            let sheets = self.sheets;
+            let entry = format!("fragment_{sheets}");
             let constants = [
                 ("SECTIONS", f64::from(u8::from(mode.form == FootprintForm::Sections))),
-                ("SHEETS", f64::from(self.sheets)),
+                ("SHEETS", f64::from(sheets)),
                 ("PLANE_TEXELS", f64::from(SUMMED_AREA_SIZE)),
                 ("LAYERS", f64::from(SUMMED_AREA_LAYERS)),
             ];
-            let sheets = sheets_of_a_group(self.format, self.sheets, additive);
-            render_pipeline(device, (shader, ["vertex", &entry]), &self.bindings.pipeline_layout, &sheets, &constants)
+            let targets = sheets_of_a_group(self.format, sheets, additive);
+            render_pipeline(device, (shader, ["vertex", &entry]), &self.bindings.pipeline_layout, &targets, &constants)
         })
     }
 
@@ -78,8 +77,7 @@ impl Splat {
 
     /// Binds the list of tiles to zero.
     pub fn bind_clear(&self, device: &Device, frame: &Buffer, tiles: &Buffer) -> BindGroup {
-        let resources = [("frames", frame.as_entire_binding()), ("composited", tiles.as_entire_binding())];
-        self.clear_bindings.bind(device, &resources)
+        self.clear.bind(device, frame, tiles)
     }
 
     /// Compiles the pipeline for a mode.
@@ -124,33 +122,12 @@ impl Splat {
     }
 }
 
-/// The layout of what zeroes tiles.
-pub(super) fn clear_bindings(device: &Device) -> Bindings {
-    let slots = [
-        ("frames", uniform::<Frame>(ShaderStages::VERTEX, false)),
-        ("composited", storage::<TileList>(ShaderStages::VERTEX, true)),
-    ];
-    Bindings::new(device, shaders::CLEAR, &slots)
-}
-
-/// The pipeline that clears the marked tiles of the sheet buffers; `sheets` is their number.
-pub(super) fn clear_pipeline(
-    device: &Device,
-    bindings: &Bindings,
-    format: TextureFormat,
-    sheets: u32,
-) -> RenderPipeline {
-    let entry = format!("fragment_{sheets}");
-    let attachments = sheets_of_a_group(format, sheets, None);
-    render_pipeline(device, (shaders::CLEAR, ["vertex", &entry]), &bindings.pipeline_layout, &attachments, &[])
-}
-
-/// Records a pass, given by its label, its times, its targets and the quads' indices, that zeroes tiles, given by pipeline, bind group and list, and draws
+/// Records a pass, given by its label, its times, its targets and the quads' indices, that zeroes tiles, given by stage, bind group and list, and draws
 /// lists of quads.
 pub(super) fn record_quads<'a>(
     encoder: &mut CommandEncoder,
     (label, timestamp_writes, sheets, indices): (&str, Option<RenderPassTimestampWrites<'_>>, &[TextureView], &Buffer),
-    (clear, clear_group, tiles): (&RenderPipeline, &BindGroup, &Buffer),
+    (clear, clear_group, tiles): (&Clear, &BindGroup, &Buffer),
     pipeline: &RenderPipeline,
     lists: impl IntoIterator<Item = (&'a BindGroup, u32, &'a Buffer)>,
 ) {
@@ -167,7 +144,7 @@ pub(super) fn record_quads<'a>(
     });
     let draw = std::mem::offset_of!(Indirect, draw) as u64;
     pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint16);
-    pass.set_pipeline(clear);
+    pass.set_pipeline(&clear.pipeline);
     pass.set_bind_group(0, clear_group, &[]);
     pass.draw_indexed_indirect(tiles, draw);
     pass.set_pipeline(pipeline);

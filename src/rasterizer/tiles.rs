@@ -300,7 +300,7 @@ impl TileBuffers<BufferSpec> {
             1 => None,
             _ => Some(within("the bricks of the tile rasterizer", brick_bytes)?),
         };
-        // The stage that joins channels' images binds first hits even where there are none.
+        // The stage `join` always binds a buffer of first hits, which must not be empty even where no first hits are requested.
         let gathered = results.hits_byte() + request.hit_bytes().max(size_of::<u32>() as u64);
         let gathered = within("the tile rasterizer's counts and first hits", gathered)?;
         let words = |words: usize| words as u64 * 4;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::{Channel, Scene, VolumeSource};
 use crate::appearance::{Preset, categories};
 use crate::volume::{
-    self, Access, Labels, Resampling, Selection, SpacedStore, Store, Volume, VolumeError, builtin, raw_store,
+    self, Access, AdaptedStore, Labels, Resampling, Selection, Store, Volume, VolumeError, builtin, raw_store,
 };
 
 /// The scene's volume with all channels, on the first one's grid.
@@ -50,7 +50,7 @@ pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Sto
         VolumeSource::Builtin(_) | VolumeSource::Memory => return None,
     };
     let Some(spacing) = first.spacing else { return Some(store) };
-    let spaced = |store| Ok(Arc::new(SpacedStore::new(&origin(&first.volume), store, spacing)?) as Arc<dyn Store>);
+    let spaced = |store| Ok(Arc::new(AdaptedStore::spaced(&origin(&first.volume), store, spacing)?) as Arc<dyn Store>);
     Some(store.and_then(spaced))
 }
 

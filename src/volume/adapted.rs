@@ -12,19 +12,20 @@ use super::{Store, StoreFacts, StoreLevel, VolumeError, refused};
 /// A function that is told how many chunks of a level have been read, and how many there are.
 pub type ChunkProgress = dyn Fn(u64, u64) + Send + Sync;
 
-/// A store whose voxels are farther apart, or nearer.
+/// A store with another spacing, or one whose reading somebody is told of. All else is the other store's.
 #[derive(Debug)]
-pub(crate) struct SpacedStore {
+pub(crate) struct AdaptedStore {
     store: Arc<dyn Store>,
     levels: Vec<StoreLevel>,
+    watch: Option<Watch>,
 }
 
-impl SpacedStore {
+impl AdaptedStore {
     /// A store with the spacing of its finest level; the others' is in proportion. `origin` names the store in errors.
     ///
     /// # Errors
     /// As for [`Volume::with_spacing`](super::Volume::with_spacing).
-    pub(crate) fn new(origin: &str, store: Arc<dyn Store>, spacing: DVec3) -> Result<Self, VolumeError> {
+    pub(crate) fn spaced(origin: &str, store: Arc<dyn Store>, spacing: DVec3) -> Result<Self, VolumeError> {
         check_spacing("spacing", spacing).map_err(|error| refused(origin, error))?;
         let spaced = |level: &StoreLevel| {
             let grid = level.grid.with_finest_spacing(spacing);
@@ -32,47 +33,19 @@ impl SpacedStore {
             Ok(StoreLevel { grid, ..*level })
         };
         let levels = store.levels().iter().map(spaced).collect::<Result<_, VolumeError>>()?;
-        Ok(Self { store, levels })
+        Ok(Self { store, levels, watch: None })
+    }
+
+    /// A store that tells of the chunks of one level that are read, each once.
+    pub(super) fn watched(store: Arc<dyn Store>, level: usize, progress: Arc<ChunkProgress>) -> Self {
+        let levels = store.levels().to_vec();
+        let watch = Watch::new(level, levels[level].chunks(), progress);
+        Self { store, levels, watch: Some(watch) }
     }
 }
 
-impl Store for SpacedStore {
-    fn levels(&self) -> &[StoreLevel] {
-        &self.levels
-    }
-
-    fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
-        self.store.read(level, from, dims, values)
-    }
-
-    fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError> {
-        self.store.contains(level, chunk)
-    }
-
-    fn fill(&self) -> f32 {
-        self.store.fill()
-    }
-
-    fn range(&self, level: usize) -> Option<[f32; 2]> {
-        self.store.range(level)
-    }
-
-    fn chunk_range(&self, level: usize, chunk: UVec3) -> Option<[f32; 2]> {
-        self.store.chunk_range(level, chunk)
-    }
-
-    fn facts(&self) -> StoreFacts {
-        self.store.facts()
-    }
-
-    fn identity(&self) -> String {
-        self.store.identity()
-    }
-}
-
-/// A store that tells of the chunks of one level that are read, each once.
-pub(super) struct WatchedStore {
-    store: Arc<dyn Store>,
+/// The chunks of a level that have been read.
+struct Watch {
     level: usize,
     total: u64,
     /// A bit for every chunk: whether any of its voxels has been read.
@@ -81,16 +54,15 @@ pub(super) struct WatchedStore {
     progress: Arc<ChunkProgress>,
 }
 
-impl WatchedStore {
-    pub(super) fn new(store: Arc<dyn Store>, level: usize, progress: Arc<ChunkProgress>) -> Self {
-        let total = store.levels()[level].chunks().as_u64vec3().element_product();
+impl Watch {
+    fn new(level: usize, chunks: UVec3, progress: Arc<ChunkProgress>) -> Self {
+        let total = chunks.as_u64vec3().element_product();
         let read = (0..total.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
-        Self { store, level, total, read, count: AtomicU64::new(0), progress }
+        Self { level, total, read, count: AtomicU64::new(0), progress }
     }
 
-    /// Notes that a box has been read.
-    fn note(&self, from: UVec3, dims: UVec3) {
-        let of = &self.store.levels()[self.level];
+    /// Notes that a box of the level has been read.
+    fn note(&self, of: &StoreLevel, from: UVec3, dims: UVec3) {
         let (across, first, last) = (of.chunks().as_u64vec3(), from / of.chunk, (from + dims - 1) / of.chunk);
         for (z, y) in (first.z..=last.z).flat_map(|z| (first.y..=last.y).map(move |y| (z, y))) {
             for x in first.x..=last.x {
@@ -104,21 +76,21 @@ impl WatchedStore {
     }
 }
 
-impl Debug for WatchedStore {
+impl Debug for Watch {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.debug_struct("WatchedStore").field("store", &self.store).field("level", &self.level).finish_non_exhaustive()
+        f.debug_struct("Watch").field("level", &self.level).field("total", &self.total).finish_non_exhaustive()
     }
 }
 
-impl Store for WatchedStore {
+impl Store for AdaptedStore {
     fn levels(&self) -> &[StoreLevel] {
-        self.store.levels()
+        &self.levels
     }
 
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
         let bytes = self.store.read(level, from, dims, values)?;
-        if level == self.level {
-            self.note(from, dims);
+        if let Some(watch) = self.watch.as_ref().filter(|watch| watch.level == level) {
+            watch.note(&self.levels[level], from, dims);
         }
         Ok(bytes)
     }

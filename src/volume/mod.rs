@@ -64,8 +64,8 @@ use glam::{DVec3, UVec3};
 
 pub(crate) use access::Access;
 pub use access::ReadOptions;
+pub(crate) use adapted::AdaptedStore;
 pub use adapted::ChunkProgress;
-pub(crate) use adapted::SpacedStore;
 pub(crate) use address::{is_address, written_in};
 use coefficients::KeptCoefficients;
 pub use colors::Texel;

@@ -112,7 +112,7 @@ fn read(store: &dyn Store, number: usize, level: &StoreLevel, chunk: UVec3) -> R
     Ok(Read { low, dims, values: Some(values), bytes })
 }
 
-/// A chunk's voxels in the sample, from what was read of it or of one near by; `None` if there are none.
+/// The sample's voxels within a chunk, from the values of this chunk or of a neighbour that stands for it; `None` if the sample has no voxel there.
 fn piece(
     store: &dyn Store,
     (number, level): (usize, &StoreLevel),

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::adapted::WatchedStore;
+use super::adapted::AdaptedStore;
 use super::{ChunkProgress, Grid, IndexedStore, Store, StoreIndex, Volume, VolumeError, sample};
 use crate::stats::StoreCounts;
 
@@ -48,7 +48,7 @@ impl StreamedVolume {
 
     /// The same volume, with a function that is told of every chunk of the level when it is read for the first time. Several threads may call it at once.
     pub fn watched_by(self, progress: Arc<ChunkProgress>) -> Self {
-        let store = Arc::new(WatchedStore::new(self.store, self.level, progress));
+        let store = Arc::new(AdaptedStore::watched(self.store, self.level, progress));
         Self { store, ..self }
     }
 

@@ -101,8 +101,7 @@ fn every_preset_shows_something_of_every_builtin() {
             // Without contrast agent few vessels are visible, and thin branches are faint in a sum.
             let least = match kind {
                 Preset::CtVessels => 20,
-                // A surface that lets others through is faint, too.
-                Preset::Xray | Preset::Fusion => 40,
+                Preset::Xray => 40,
                 _ => 80,
             };
             let volume = scene.load_volume().unwrap();

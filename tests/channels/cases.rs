@@ -1,11 +1,10 @@
 //! Random cases of several channels with what else a scene may have: culling, label tables, cuts, other methods and kernels.
 
 use std::collections::BTreeMap;
-use std::path::Path;
 
 use glam::DVec3;
-use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
-use sheetsplat::scene::{Scene, VolumeSource};
+use sheetsplat::headless::Backend;
+use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Classification, Clip, Compositing, Interpolation, LabelTables, Method, Ramp};
 use sheetsplat::volume::{Labels, Volume};
 
@@ -150,42 +149,4 @@ fn culling_keeps_its_guarantee_over_sums() {
         }
     }
     assert!(seen_sections * 10 < all_sections * 9, "{seen_sections} of {all_sections} sections are drawn");
-}
-
-#[test]
-fn picks_after_splatting_name_the_channel() {
-    let text = "
-        splatting = {classification = 'after', compositing = 'exponential'}
-        image = {width = 32, height = 32}
-        camera.direction = [0, 1, 0]
-        [[channel]]
-        name = 'left'
-        transfer = {opacity = [[0, 0], [1, 0.9]], color = [[0, [1, 0, 0]]]}
-        [[channel]]
-        name = 'right'
-        transfer = {opacity = [[0, 0], [1, 0.9]], color = [[0, [0, 1, 0]]]}
-    ";
-    let half = |is_left: bool| {
-        let values = (0..16_u32.pow(3)).map(|index| f32::from(u8::from((index % 16 < 8) == is_left)) * 5.0);
-        Volume::new("half", glam::UVec3::splat(16), DVec3::ONE, values.collect()).unwrap()
-    };
-    let volume = half(true).with_channels("halves", vec![half(false)]).unwrap();
-    let scene = Scene::parse_for(VolumeSource::Memory, text, "a", Path::new(""), &[]).unwrap();
-    for (backend, compositing) in NATIVE
-        .into_iter()
-        .flat_map(|backend| [Compositing::Exponential, Compositing::Surface].map(|compositing| (backend, compositing)))
-    {
-        let mut scene = scene.clone();
-        scene.splatting.compositing = compositing;
-        let headless = Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap();
-        let mut view = headless.view(volume.clone(), &scene).unwrap();
-        view.set_first_hit(Some(0.5)).unwrap();
-        headless.draw(&mut view).unwrap();
-        for (column, number, name) in [(10, 0, "left"), (21, 1, "right")] {
-            let pick = headless.pick(&view, [column, 16]).unwrap().unwrap();
-            assert_eq!((pick.channel, pick.value), (number, 5.0), "{backend} {compositing:?}");
-            assert_eq!(scene.channel_name(&volume, pick.channel), name);
-        }
-        assert_eq!(headless.pick(&view, [0, 0]).unwrap(), None, "{backend} {compositing:?}: beside both");
-    }
 }

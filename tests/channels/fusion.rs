@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::{DVec3, UVec3};
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
+use sheetsplat::settings::{Classification, Compositing};
 use sheetsplat::volume::Volume;
 
 use super::common::compare::assert_at_most;
@@ -112,7 +113,6 @@ fn without_a_space_centres_coincide() {
 #[test]
 fn picks_name_the_channel() {
     let text = "
-        splatting = {classification = 'before', compositing = 'exponential'}
         image = {width = 32, height = 32}
         camera.direction = [0, 1, 0]
         [[channel]]
@@ -129,16 +129,28 @@ fn picks_name_the_channel() {
     let volume = half(true).with_channels("halves", vec![half(false)]).unwrap();
     let source = sheetsplat::scene::VolumeSource::Memory;
     let scene = Scene::parse_for(source, text, "a", Path::new(""), &[]).unwrap();
-    for backend in [Backend::Gpu, Backend::Cpu, Backend::Reference] {
+    let modes = [
+        (Classification::Before, Compositing::Exponential),
+        (Classification::After, Compositing::Exponential),
+        (Classification::After, Compositing::Surface),
+    ];
+    for (backend, (classification, compositing)) in [Backend::Gpu, Backend::Cpu, Backend::Reference]
+        .into_iter()
+        .flat_map(|backend| modes.map(|mode| (backend, mode)))
+    {
+        let mut scene = scene.clone();
+        (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
+        let what = format!("{backend} {classification:?} {compositing:?}");
         let headless = Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap();
         let mut view = headless.view(volume.clone(), &scene).unwrap();
         view.set_first_hit(Some(0.5)).unwrap();
         headless.draw(&mut view).unwrap();
         for (column, number, name) in [(10, 0, "left"), (21, 1, "right")] {
             let pick = headless.pick(&view, [column, 16]).unwrap().unwrap();
-            assert_eq!((pick.channel, pick.value), (number, 5.0), "{backend}");
+            assert_eq!((pick.channel, pick.value), (number, 5.0), "{what}");
             assert_eq!(scene.channel_name(&volume, pick.channel), name);
         }
+        assert_eq!(headless.pick(&view, [0, 0]).unwrap(), None, "{what}: beside both");
     }
 }
 

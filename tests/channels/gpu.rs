@@ -47,8 +47,13 @@ fn assert_is_the_twins(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, what: 
             // A surface is there or not, and in one voxel's cell or the next, which rounding decides at rims.
             let pixels = actual.image.pixels.iter().zip(&expected.image.pixels);
             let is_off = |(a, b): &(&[f32; 4], &[f32; 4])| (0..4).any(|at| (a[at] - b[at]).abs() > 0.01);
-            let (off, all) = (pixels.filter(is_off).count(), actual.image.pixels.len());
-            assert!(off * 50 <= all, "{what}: {off} of {all} pixels are off");
+            let (off, others): (Vec<_>, Vec<_>) = pixels.partition(is_off);
+            let all = actual.image.pixels.len();
+            println!("{what}: {} of {all} pixels are off", off.len());
+            assert!(off.len() * 100 <= all, "{what}: {} of {all} pixels are off", off.len());
+            let squares = others.iter().flat_map(|(a, b)| (0..4).map(move |at| f64::from(a[at] - b[at]).powi(2)));
+            let distance = (squares.sum::<f64>() / (4 * others.len()) as f64).sqrt();
+            assert!(distance == 0.0 || decibels(distance) >= required, "{what}: {:.1} dB", decibels(distance));
         } else if actual.image != expected.image {
             let measured = decibels(rms(&actual.image, &expected.image));
             println!("{what}: {measured:.1} dB");
@@ -209,7 +214,7 @@ fn a_volume_split_by_voxels_is_the_whole() {
 #[test]
 fn one_channel_is_a_scene_of_one_volume() {
     let gpu = gpu();
-    let keys = "transfer.opacity = [[30, 0], [200, 0.9]]\ntransfer.color = [[0, [1, 0.5, 0]]]\n\
+    let keys = "transfer.opacity = [[0, 0.2], [200, 0.9]]\ntransfer.color = [[0, [1, 0.5, 0]]]\n\
                 [camera]\ndirection = [0.3, 1, -0.2]\n[image]\nwidth = 40\nheight = 40\n";
     let parse = |text: &str| Scene::parse(text, "test", std::path::Path::new(""), &[]).unwrap();
     let one = parse(&format!("volume.builtin = 'head:20'\n{keys}"));
@@ -227,9 +232,7 @@ fn one_channel_is_a_scene_of_one_volume() {
                 gpu.render(&scene).unwrap().image
             });
             assert_eq!(first, second, "{classification:?} {compositing:?} by {rasterizer:?}");
-            // The least values are those of the air.
-            let shows_air = compositing == Compositing::Minimum;
-            assert!(shows_air || first.pixels.iter().any(|pixel| pixel[0] > 0.1), "{classification:?} {compositing:?}");
+            assert!(first.pixels.iter().any(|pixel| pixel[0] > 0.1), "{classification:?} {compositing:?}");
         }
     }
 }
@@ -282,6 +285,9 @@ fn picks_are_those_of_the_native_backend() {
     for (classification, compositing) in modes().filter(|(_, compositing)| *compositing != Compositing::Minimum) {
         let (volume, mut scene) = random_case(&mut random, 2);
         (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
+        // So opaque that averages and surfaces are hit.
+        let opaque = |red: f64| transfer(&[(0.0, [red, 0.6, 0.3])], &[(20.0, 0.0), (70.0, 0.9)]);
+        set_transfers(&mut scene, &[opaque(0.9), opaque(0.1)]);
         let opacity = 0.2;
         let mut native = sheetsplat::cpu::CpuRenderer::new(volume.clone(), &scene).unwrap();
         native.set_first_hit(Some(opacity)).unwrap();
@@ -307,9 +313,7 @@ fn picks_are_those_of_the_native_backend() {
             }
             // Rounding decides at rims, and between a voxel and its neighbour.
             assert!(agreeing * 20 >= all * 19, "{what}: {agreeing} of {all} picks agree");
-            // An average may nowhere be as opaque, and a slab have no surface.
-            let may_lack = matches!(compositing, Compositing::Average | Compositing::Surface);
-            assert!(may_lack || channels[0] + channels[1] > 10, "{what}: {channels:?}");
+            assert!(channels[0] + channels[1] > 10, "{what}: {channels:?}");
         }
     }
 }
@@ -385,18 +389,21 @@ fn memory_grows_with_the_channels() {
     let bytes = |volume| GpuVolume::estimate(gpu.device(), volume).unwrap()[0];
     let (one, four) = (bytes(&single(&volume)), bytes(&volume));
     assert!(four <= 4 * one && four > one, "{four} and {one} bytes");
+    let channels: Vec<Volume> = volume.channels().map(single).collect();
     for (classification, compositing) in modes() {
-        let used = [1, 2, 3, 4].map(|count| {
-            let (volume, mut scene) = first_channels(&volume, &scene, count);
+        let used_by = |volume: &Volume, count| {
+            let (volume, mut scene) = first_channels(volume, &scene, count);
             (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
             scene.splatting.rasterizer = Rasterizer::Quads;
             gpu.render_volume(volume, &scene).unwrap().stats.gpu_bytes
-        });
-        let what = format!("{classification:?} {compositing:?}: {used:?} bytes");
-        // The buffers that join images come with the second channel. Channels show different bricks.
+        };
+        let alone: Vec<u64> = channels.iter().map(|channel| used_by(channel, 1)).collect();
+        let used = [1, 2, 3, 4].map(|count| used_by(&volume, count));
+        let what = format!("{classification:?} {compositing:?}: {used:?} bytes, channels alone {alone:?}");
+        // The buffers that join images come with the second channel.
         let joined = 20 * 32 * 32 + 1024;
         for (count, &used_by) in (1..).zip(&used) {
-            assert!(used_by <= count * used[0] * 21 / 20 + joined, "{what}");
+            assert!(used_by <= alone[..count].iter().sum::<u64>() + joined, "{what}");
         }
         assert!(used.is_sorted(), "{what}");
     }

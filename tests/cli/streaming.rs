@@ -137,7 +137,8 @@ fn everything_is_drawn_of_a_volume_larger_than_memory() {
         .assert_failure(2, &["whole-1.exr: scene: found ", ", as in streamed-0.exr"]);
 }
 
-/// A process that streams takes memory by its limit, here 0.62 of the values, beside what any process of the program has.
+/// A process that streams has no more in memory than its limit, beside what any process of the program has. The C library returns freed memory at once here,
+/// because what it keeps for later is not the program's.
 #[cfg(target_os = "linux")]
 #[test]
 fn memory_stays_within_the_limit() {
@@ -151,7 +152,7 @@ fn memory_stays_within_the_limit() {
     let ball = "ball.raw --dims 256,256,256 --type uint8";
     let set = "--backend cpu --set image={width=96,height=96} --set camera.fit=volume --set transfer.opacity=[[60,0],[80,1]] \
                --set transfer.color=[[0,[1,1,1]]]";
-    let two = [("RAYON_NUM_THREADS", "2")];
+    let two = [("RAYON_NUM_THREADS", "2"), ("MALLOC_TRIM_THRESHOLD_", "65536")];
     let peak = |what: &str| {
         let run = folder.run_with(&two, "", &format!("bench {what} {set} --frames 1"));
         let report: Value = serde_json::from_str(&run.stdout).unwrap_or_else(|error| panic!("{error}: {}", run.stderr));
@@ -164,14 +165,14 @@ fn memory_stays_within_the_limit() {
         let streamed = peak(&format!("{ball} {set} --memory 40MiB"));
         let whole = peak(&format!("{ball} {set}"));
         println!("{classification}: {base:.0} MiB without a volume, {streamed:.0} streamed, {whole:.0} in memory");
-        // What voxels are drawn from takes more than their values, in memory as in chunks.
-        assert!(whole - base >= 64.0 && streamed - base <= 0.64 * (whole - base), "{base} {streamed} {whole}");
+        // Eight more are for what does not grow with the volume, such as the sheets of the threads' tiles.
+        assert!(streamed - base <= 48.0 && whole - base >= 64.0, "{base} {streamed} {whole}");
     }
     folder
         .run_with(&two, "", &format!("render {ball} {set} --memory 40MiB -o a.npy --stats stats.json"))
         .assert_success();
     let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
-    assert!((base..base + 64.0).contains(&stats["peak_rss_mib"].as_f64().unwrap()), "{base} {stats}");
+    assert!((base..base + 48.0).contains(&stats["peak_rss_mib"].as_f64().unwrap()), "{base} {stats}");
     folder.run(&format!("render builtin:head:8 {set} -o a.npy --stats stats.json")).assert_success();
     let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
     assert!(stats["peak_rss_mib"].is_null() && stats["sample_chunks_read"].is_null(), "{stats}");

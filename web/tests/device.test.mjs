@@ -102,6 +102,8 @@ test("another device takes the place of a lost one, with the camera and its home
 
 test("where no other device opens, auto goes on drawing on the CPU", async () => {
     const { page: shown } = await demo(opened, "backend=auto&workers=2&example=head:16", { ...TINY, inWorkers: failing("(count) => count > 1") });
+    // Backends find voxels hidden at different sheets, which may change a picture by one minus the opacity threshold.
+    await shown.evaluate(async () => window.view.setScene(await window.view.scene(), { set: { "splatting.culling": false }, keepCamera: true }));
     const home = await shown.evaluate(() => window.view.scene());
     assert.equal(await shown.evaluate(() => window.view.backend), "gpu");
     await moved(shown);
@@ -118,8 +120,7 @@ test("where no other device opens, auto goes on drawing on the CPU", async () =>
     assert.deepEqual(await camera(shown), place);
     const after = await pixels();
     assert.equal(after.length, before.length);
-    // Culling may change a channel by one minus the opacity at which pixels count as opaque, 0.95.
-    const apart = after.filter((channel, at) => Math.abs(channel - before[at]) > 13).length;
+    const apart = after.filter((channel, at) => Math.abs(channel - before[at]) > 1).length;
     assert.ok(apart <= after.length * 0.002, `${apart} of ${after.length} bytes`);
     // The new canvas has the old one's place, focus and controls.
     assert.ok(await shown.evaluate(() => document.activeElement === window.view.canvas && window.view.canvas.id === "canvas"));

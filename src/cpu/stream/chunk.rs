@@ -64,6 +64,9 @@ impl Chunk {
             placed = bricks.iter().enumerate().filter_map(place).collect();
             placed.sort_unstable_by_key(|placed: &Placed| (placed.first, placed.brick));
             new = Drawn::new(bricks.len(), &splats.projection.view);
+            // What is counted as held is what is allocated.
+            bricks.shrink_to_fit();
+            placed.shrink_to_fit();
         }
         let bytes = values.as_ref().map_or(0, |volume| size_of_val(volume.values()))
             + bricks.len() * (size_of::<Brick>() + 2 * size_of::<u64>())

@@ -199,6 +199,16 @@ struct Seen {
     hidden_for_good: u32,
 }
 
+impl Seen {
+    fn add(&mut self, other: &Self) {
+        self.most_bricks = self.most_bricks.max(other.most_bricks);
+        self.drawn += other.drawn;
+        self.without_visits += other.without_visits;
+        self.with_some += other.with_some;
+        self.hidden_for_good += other.hidden_for_good;
+    }
+}
+
 impl Case {
     fn transfer() -> TransferFunction {
         TransferFunction {
@@ -355,10 +365,7 @@ fn dense_bricks() {
             let case = dense(&mut random, sheets, true);
             let masks = masks(&mut random, [case.scene.image.width, case.scene.image.height]);
             let seen = case.check(&gpu, &stage, &masks);
-            all.drawn += seen.drawn;
-            all.without_visits += seen.without_visits;
-            all.with_some += seen.with_some;
-            all.hidden_for_good += seen.hidden_for_good;
+            all.add(&seen);
         }
     }
     assert!(all.drawn > 10_000 && all.hidden_for_good > 1000, "{all:?}");
@@ -385,10 +392,7 @@ fn any_eye_and_slices() {
             }
             let masks = masks(&mut random, [case.scene.image.width, case.scene.image.height]);
             let seen = case.check(&gpu, &stage, &masks);
-            all.drawn += seen.drawn;
-            all.without_visits += seen.without_visits;
-            all.with_some += seen.with_some;
-            all.hidden_for_good += seen.hidden_for_good;
+            all.add(&seen);
         }
     }
     println!("{all:?}");
@@ -414,10 +418,7 @@ fn planes_of_any_eye() {
         }
         let masks = masks(&mut random, [case.scene.image.width, case.scene.image.height]);
         let seen = case.check(&gpu, &stage, &masks);
-        all.drawn += seen.drawn;
-        all.without_visits += seen.without_visits;
-        all.with_some += seen.with_some;
-        all.hidden_for_good += seen.hidden_for_good;
+        all.add(&seen);
     }
     println!("{all:?}");
     assert!(all.drawn > 10_000 && all.hidden_for_good > 1000 && all.with_some > 30, "{all:?}");
