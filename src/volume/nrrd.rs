@@ -267,11 +267,16 @@ impl Header {
 
     fn layout(&self, dims: UVec3, series: Series) -> Result<Layout, VolumeError> {
         let kind = self.0.value("type", TYPES, |text| sample_type(text?))?;
-        let allowed = "raw, gzip or gz, bzip2 or bz2, ascii, text or txt, or hex";
+        let allowed = if cfg!(feature = "bzip2") {
+            "raw, gzip or gz, bzip2 or bz2, ascii, text or txt, or hex"
+        } else {
+            "raw, gzip or gz, ascii, text or txt, or hex; not compiled in: bzip2 or bz2 (the feature bzip2)"
+        };
         let encoding = self.0.value("encoding", allowed, |text| {
             Some(match lower(text?).as_str() {
                 "raw" => Encoding::Raw,
                 "gzip" | "gz" => Encoding::Gzip,
+                #[cfg(feature = "bzip2")]
                 "bzip2" | "bz2" => Encoding::Bzip2,
                 "ascii" | "text" | "txt" => Encoding::Text,
                 "hex" => Encoding::Hex,
@@ -323,6 +328,7 @@ fn sample_type(text: &str) -> Option<SampleType> {
 enum Encoding {
     Raw,
     Gzip,
+    #[cfg(feature = "bzip2")]
     Bzip2,
     Text,
     Hex,
@@ -351,6 +357,7 @@ impl Layout {
         let mut stream = match self.encoding {
             Encoding::Raw => Stream::raw(file)?,
             Encoding::Gzip => Stream::gzip(file)?,
+            #[cfg(feature = "bzip2")]
             Encoding::Bzip2 => Stream::bzip2(file),
             Encoding::Text => {
                 return Stream::text(file, samples.kind, TextEnd::File)?.series(samples, &self.series, false);

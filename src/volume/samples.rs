@@ -8,6 +8,7 @@ use std::fmt::{self, Display, Formatter};
 use std::io::{self, BufRead, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 
+#[cfg(feature = "bzip2")]
 use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::MultiGzDecoder;
 #[cfg(feature = "metaimage")]
@@ -284,6 +285,7 @@ impl Stream {
     }
 
     /// The rest of a file, decompressed from one or more bzip2 streams. Their size does not bound the output; the number of samples does.
+    #[cfg(feature = "bzip2")]
     pub(super) fn bzip2(file: Source) -> Self {
         let decoder = Box::new(MultiBzDecoder::new(file.reader));
         Self::decoded(&file.path, decoder, "whole and undamaged bzip2 streams", u64::MAX, &file.access)
