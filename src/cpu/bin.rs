@@ -43,10 +43,29 @@ pub(super) fn columns(size: [u32; 2]) -> usize {
 /// The bricks that may be on the image, by first sheet and then in memory order.
 pub(super) fn place(bricks: &[Brick], projection: &Projection, support: f64) -> Vec<Placed> {
     let numbered = bricks.par_iter().enumerate();
-    let mut placed: Vec<Placed> =
-        numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support)).collect();
-    placed.par_sort_unstable_by_key(|placed| (placed.first, placed.brick));
-    placed
+    by_first(numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support)).collect())
+}
+
+/// Sorts bricks by first sheet; those that share it keep their order.
+pub(super) fn by_first(placed: Vec<Placed>) -> Vec<Placed> {
+    let first = |placed: &Placed| placed.first;
+    let Some(least) = placed.iter().map(first).min() else { return placed };
+    // How many begin before each sheet.
+    let mut before = Vec::new();
+    for placed in &placed {
+        let next = (placed.first - least) as usize + 1;
+        before.resize(before.len().max(next + 1), 0_u32);
+        before[next] += 1;
+    }
+    let mut sum = 0;
+    before.iter_mut().for_each(|count| (sum, *count) = (sum + *count, sum + *count));
+    let mut order = vec![0; placed.len()];
+    for (at, placed) in placed.iter().enumerate() {
+        let place = &mut before[(placed.first - least) as usize];
+        order[*place as usize] = at;
+        *place += 1;
+    }
+    order.into_par_iter().map(|at| placed[at].clone()).collect()
 }
 
 /// Where a brick is; `None` off the image.

@@ -36,7 +36,8 @@ impl Site<'_> {
     fn target(&self) -> PathBuf {
         let beside_tmp = self.target_tmpdir.and_then(|tmpdir| Path::new(tmpdir).parent()).map(Path::to_owned);
         // Unit tests run below the target folder, in which Cargo puts these files: the second one even where it did not make the folder.
-        let is_target = |folder: &&Path| ["CACHEDIR.TAG", ".rustc_info.json"].iter().any(|file| folder.join(file).is_file());
+        let is_target =
+            |folder: &&Path| ["CACHEDIR.TAG", ".rustc_info.json"].iter().any(|file| folder.join(file).is_file());
         let above_program = || std::env::current_exe().ok()?.ancestors().find(is_target).map(Path::to_owned);
         beside_tmp.or_else(above_program).unwrap_or_else(|| Path::new(self.manifest_dir).join("target"))
     }

@@ -6,7 +6,9 @@ use glam::UVec3;
 
 use super::cells::{Cells, Work};
 use super::colors::{Colors, ColorsOf};
+use super::differences::Differences;
 use super::extreme::is_choice;
+use super::field::Field;
 use super::slab_integral::Integrals;
 use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::after::coefficients;
@@ -18,6 +20,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick::Brick;
 use crate::lists::brick::BrickList;
 use crate::scene::Scene;
+use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Compositing, Interpolation};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
@@ -31,11 +34,24 @@ pub(in crate::cpu) struct Coefficients {
     exact: Option<Arc<[f32]>>,
     /// Of volumes of colours.
     colors: Option<Colors>,
+    /// Of the values, which only gradients need.
+    differences: Kept,
     ranges: Option<Ranges>,
     /// Of the last frame, if the ranges are still its ranges.
     shown: Option<Shown>,
     /// Whether the transfer function or the compositing have changed since.
     is_stale: bool,
+}
+
+/// The differences of a volume's values.
+#[derive(Clone, Debug)]
+enum Kept {
+    /// No frame has needed them.
+    Unused,
+    /// One frame has. It computes those that it needs, which is faster than all.
+    Once,
+    /// Further frames have; nothing if there are too many.
+    Often(Option<Arc<Differences>>),
 }
 
 /// The minimum and maximum coefficients around bricks, which change with the view, but with no transfer function.
@@ -75,7 +91,7 @@ impl Coefficients {
         let all = exact.as_deref().unwrap_or(volume.values());
         let numbers = Normalization::of(all.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
         let colors = Colors::new(volume, splatting.interpolation, kernel)?;
-        Ok(Self { numbers, exact, colors, ranges: None, shown: None, is_stale: false })
+        Ok(Self { numbers, exact, colors, differences: Kept::Unused, ranges: None, shown: None, is_stale: false })
     }
 
     /// All of them, in memory order; NaN at holes.
@@ -86,6 +102,27 @@ impl Coefficients {
     /// The coefficients of the voxels' own colours, if they have any.
     pub(super) fn colors<'a>(&'a self, volume: &'a Volume) -> Option<ColorsOf<'a>> {
         self.colors.as_ref().and_then(|colors| colors.of(volume))
+    }
+
+    /// Prepares for a frame of a scene what its gradients need.
+    pub(in crate::cpu) fn prepare_gradients(&mut self, volume: &Volume, scene: &Scene) {
+        let is_kept = scene.shading.gradient == Gradient::Differences && Field::is_narrow(scene.splatting.radius);
+        if !(scene.shading.enabled && is_kept) {
+            return;
+        }
+        match self.differences {
+            Kept::Unused => self.differences = Kept::Once,
+            Kept::Once => self.differences = Kept::Often(Differences::new(volume).map(Arc::new)),
+            Kept::Often(_) => {}
+        }
+    }
+
+    /// The differences of the volume's values, if they are kept.
+    pub(super) fn differences(&self) -> Option<&Differences> {
+        match &self.differences {
+            Kept::Often(differences) => differences.as_deref(),
+            Kept::Unused | Kept::Once => None,
+        }
     }
 
     /// Lets the next frame test bricks anew, because the transfer function or the compositing changed.

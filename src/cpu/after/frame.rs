@@ -3,6 +3,7 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
 use glam::DVec3;
 
@@ -15,7 +16,7 @@ use super::planes::Points;
 use super::slab_integral::Integrals;
 use super::tile::TileWalk;
 use crate::after::normalization::Normalization;
-use crate::cpu::bin::Placed;
+use crate::cpu::bin::{Placed, by_first};
 use crate::cpu::composite::Compositor;
 use crate::cpu::cut::{RayMode, TileRays};
 use crate::cpu::first_hit;
@@ -115,7 +116,14 @@ impl<'a> Frame<'a> {
         }
         let (at_hand, extent, coefficients, colors) = matter.at_hand();
         let kernel = (splatting.radius, splatting.falloff);
-        let field = Field::new((at_hand, extent), (coefficients, colors), numbers, kernel, shading.gradient);
+        let field = Field::new(
+            (at_hand, extent),
+            (coefficients, colors),
+            matter.differences(),
+            numbers,
+            kernel,
+            shading.gradient,
+        );
         Self {
             channel,
             matter,
@@ -180,9 +188,7 @@ impl<'a> Frame<'a> {
             let further = place(frame);
             placed.extend(further.into_iter().map(|placed| Placed { channel: frame.channel, ..placed }));
         }
-        if frames.len() > 1 {
-            placed.par_sort_unstable_by_key(|placed| (placed.first, placed.channel, placed.brick));
-        }
+        let placed = by_first(placed);
         let has_hits = first.compositor.first_hit.is_some();
         let has_extremes = first.resolver.is_none() && is_choice(first.compositing);
         let (content, first_hits, tally) = draw_tiles(
@@ -204,7 +210,8 @@ impl<'a> Frame<'a> {
         );
         let [columns, rows] = tile_grid(size);
         let sheets = Self::touched(frames).len() as u64;
-        let sections = frames.iter().map(Self::sections).fold([0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+        let sections =
+            frames.iter().map(|frame| frame.sections(level)).fold([0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
         let voxels = |frame: &Self| -> u64 {
             frame.matter.shown().iter().map(|brick| u64::from(brick::present(brick).count_ones())).sum()
         };
@@ -253,7 +260,7 @@ impl<'a> Frame<'a> {
 
     /// Pairs of voxels and planes nearer to them than the kernel's radius: all, and those of bricks that were drawn. A brick that is not
     /// wanted itself was drawn unless its kernels reach wanted bricks and none of those was.
-    fn sections(&self) -> [u64; 2] {
+    fn sections(&self, level: Level) -> [u64; 2] {
         let Placement { geometry, view, .. } = &self.placement;
         let across = self.placement.bricks();
         let reach = (geometry.widest_half_box(view) / f64::from(brick::SIDE)).ceil().min(across.as_dvec3()).as_uvec3();
@@ -265,7 +272,10 @@ impl<'a> Frame<'a> {
             let state = |state: &AtomicU8| state.load(Ordering::Relaxed);
             let own = state(&self.drawn[(at.x + across.x * (at.y + across.y * at.z)) as usize]);
             let is_hidden = if own == 0 { around.map(state).max() == Some(WANTED) } else { own == WANTED };
-            let sections = self.placement.sections(brick);
+            let sections = dispatch!(level, simd => simd.vectorize(
+                #[cfg_attr(not(debug_assertions), inline(always))]
+                || self.placement.sections(simd, brick),
+            ));
             [sections, if is_hidden { 0 } else { sections }]
         };
         self.matter.shown().par_iter().map(of_brick).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])

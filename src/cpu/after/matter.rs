@@ -7,6 +7,7 @@ use glam::UVec3;
 use super::cells::Cells;
 use super::coefficients::Coefficients;
 use super::colors::ColorsOf;
+use super::differences::Differences;
 use super::held::Extent;
 use crate::after::normalization::Normalization;
 use crate::cpu::stream::Stream;
@@ -68,6 +69,14 @@ impl<'a> Matter<'a> {
                 let extent = Extent { dims: stream.grid().dims, low: UVec3::ZERO, held: nothing.dims() };
                 (nothing, extent, nothing.values(), None)
             }
+        }
+    }
+
+    /// The differences of the values at hand for all tiles, if they are kept.
+    pub(super) fn differences(&self) -> Option<&'a Differences> {
+        match self {
+            Self::Whole { coefficients, .. } => coefficients.differences(),
+            Self::Streamed { .. } => None,
         }
     }
 

@@ -14,6 +14,7 @@ mod cells;
 mod classify;
 mod coefficients;
 mod colors;
+mod differences;
 mod extreme;
 mod field;
 mod frame;

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use fearless_simd::prelude::*;
+use fearless_simd::{f64x4, mask64x4};
 use glam::{DVec2, DVec3, UVec3};
 
 use crate::cpu::bin::Placed;
@@ -54,21 +56,24 @@ impl Placement {
     }
 
     /// The number of planes within a kernel's radius of each of a brick's voxels, in all.
-    pub(super) fn sections(&self, brick: &Brick) -> u64 {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn sections<S: Simd>(&self, simd: S, brick: &Brick) -> u64 {
         let row = self.view.screen_from_voxel[2];
         let first =
             (row.dot(brick::origin(brick).as_dvec3().extend(1.0)) - self.view.slabs.origin) / self.view.slabs.width;
-        let nearest = if self.view.perspective.is_some() { 1 } else { i32::MIN };
-        let counts = self.depths.map(|depth| {
-            let depth = first + depth;
-            let start = (floor(depth - self.reach + slab::ROUNDING) + 1).max(nearest);
-            let end = -floor(-(depth + self.reach - slab::ROUNDING));
-            (end - start).max(0)
-        });
-        let present = brick::present(brick);
-        let of_voxels =
-            counts.iter().enumerate().map(|(slot, &count)| if present >> slot & 1 == 1 { count } else { 0 });
-        of_voxels.map(|count| count as u64).sum()
+        let splat = |number: f64| f64x4::splat(simd, number);
+        let nearest = splat(if self.view.perspective.is_some() { 1.0 } else { f64::NEG_INFINITY });
+        let (zero, present) = (splat(0.0), brick::present(brick));
+        let mut count = zero;
+        for slot in (0..self.depths.len()).step_by(4) {
+            let depth = f64x4::from_slice(simd, &self.depths[slot..slot + 4]) + first;
+            let start = ((depth - self.reach + slab::ROUNDING).floor() + 1.0).max(nearest);
+            let end = (depth + self.reach - slab::ROUNDING).ceil();
+            let is_present = mask64x4::from_bitmask(simd, present >> slot & 0xf);
+            count += is_present.select((end - start).max(zero), zero);
+        }
+        let [a, b, c, d] = count.to_array();
+        (a + b + c + d) as u64
     }
 
     /// The pixels that the cells of some voxels may be on, from one to before another, and the slabs, of those that are drawn. Voxels at the volume's border have the points
@@ -98,7 +103,7 @@ impl Placement {
         ([low + middle - SLACK, high + middle + SLACK], slabs)
     }
 
-    /// The boxes of voxels, given by their numbers, that may be on the image, by first slab and then by number. `bounds` tells a box's first voxel, and the one
+    /// The boxes of voxels, given by their numbers, that may be on the image. `bounds` tells a box's first voxel, and the one
     /// after the last.
     pub(super) fn place(&self, boxes: &[u32], bounds: impl Fn(u32) -> (UVec3, UVec3) + Sync) -> Vec<Placed> {
         let place = |&number: &u32| {
@@ -122,9 +127,7 @@ impl Placement {
             };
             (!slabs.is_empty()).then_some(placed)
         };
-        let mut placed: Vec<Placed> = boxes.par_iter().filter_map(place).collect();
-        placed.par_sort_unstable_by_key(|placed| (placed.first, placed.brick));
-        placed
+        boxes.par_iter().filter_map(place).collect()
     }
 
     /// The longest step from plane to plane on any ray, in voxels.

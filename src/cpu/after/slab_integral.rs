@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use fearless_simd::{f32x4, f32x8};
 
 use crate::after::normalization::Normalization;
 use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
@@ -16,6 +16,7 @@ use crate::settings::transfer_function::TransferFunction;
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     points: Vec<[f32; 4]>,
+    bin_count: usize,
     cells: usize,
     /// The min and the max number with an opacity.
     shown: [f32; 2],
@@ -44,17 +45,18 @@ pub(super) struct Means<S: Simd> {
     pub(super) color: [f32x8<S>; 3],
 }
 
+/// A cell of a table.
+type Cell = [[f32; 4]; CELL];
+
+/// The cell of lanes that have none.
+const EMPTY: Cell = [[0.0; 4]; CELL];
+
 /// A part of a cell for every lane.
-#[derive(Clone, Copy, Debug, Default)]
-struct Parts {
+#[derive(Clone, Copy, Debug)]
+struct Parts<'a> {
+    cells: [&'a Cell; LANES],
     from: [f32; LANES],
     to: [f32; LANES],
-    start: [f32; LANES],
-    per_width: [f32; LANES],
-    alpha: [f32; LANES],
-    rise: [f32; LANES],
-    color: [[f32; LANES]; 3],
-    color_rise: [[f32; LANES]; 3],
     weight: [f32; LANES],
 }
 
@@ -63,19 +65,21 @@ type Sums<S> = [f32x8<S>; 5];
 
 impl Table {
     fn new(points: Vec<[f32; 4]>) -> Self {
-        let ([cells, _, low, high], bins) = (points[0], points[1]);
-        Self { cells: cells as usize, shown: [low, high], bins, points }
+        let ([cells, bin_count, low, high], bins) = (points[0], points[1]);
+        Self { bin_count: bin_count as usize, cells: cells as usize, shown: [low, high], bins, points }
     }
 
-    fn cell(&self, cell: usize) -> [[f32; 4]; CELL] {
-        let at = HEAD + self.points[0][1] as usize + CELL * cell;
-        std::array::from_fn(|entry| self.points[at + entry])
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn cell(&self, cell: usize) -> &Cell {
+        let at = HEAD + self.bin_count + CELL * cell;
+        self.points.get(at..).and_then(<[_]>::first_chunk).unwrap_or(&EMPTY)
     }
 
     /// The cell of a number in the table's range.
+    #[cfg_attr(not(debug_assertions), inline(always))]
     fn cell_of(&self, x: f32) -> usize {
         let [least, per_number, ..] = self.bins;
-        let bin = ((x - least) * per_number).clamp(0.0, self.points[0][1] - 1.0) as usize;
+        let bin = (((x - least) * per_number) as usize).min(self.bin_count - 1);
         let [mut first, mut last, ..] = self.points[HEAD + bin].map(|cell| cell as usize);
         while first < last {
             let middle = (first + last).div_ceil(2);
@@ -85,21 +89,32 @@ impl Table {
     }
 }
 
-impl Parts {
-    fn set(&mut self, lane: usize, cell: &[[f32; 4]; CELL], [from, to]: [f32; 2], weight: f32) {
-        let [[start, per_width, alpha, rise], color, color_rise] = *cell;
+impl<'a> Parts<'a> {
+    const NONE: Self = Self { cells: [&EMPTY; LANES], from: [0.0; LANES], to: [0.0; LANES], weight: [0.0; LANES] };
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn set(&mut self, lane: usize, cell: &'a Cell, [from, to]: [f32; 2], weight: f32) {
+        self.cells[lane] = cell;
         self.from[lane] = from;
         self.to[lane] = to;
-        self.start[lane] = start;
-        self.per_width[lane] = per_width;
-        self.alpha[lane] = alpha;
-        self.rise[lane] = rise;
-        for channel in 0..3 {
-            self.color[channel][lane] = color[channel];
-            self.color_rise[channel][lane] = color_rise[channel];
-        }
         self.weight[lane] = weight;
     }
+
+    /// The numbers of an entry of the cells, by lane.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn entry<S: Simd>(&self, simd: S, entry: usize) -> [f32x8<S>; 4] {
+        let row = |lane: usize| f32x4::load_array_ref(simd, &self.cells[lane][entry]);
+        let [a, b, c, d] = transposed([row(0), row(1), row(2), row(3)]);
+        let [e, f, g, h] = transposed([row(4), row(5), row(6), row(7)]);
+        [a.combine(e), b.combine(f), c.combine(g), d.combine(h)]
+    }
+}
+
+/// Rows as columns.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
+    let ([first, last], [second, third]) = ([a.zip_low(c), a.zip_high(c)], [b.zip_low(d), b.zip_high(d)]);
+    [first.zip_low(second), first.zip_high(second), last.zip_low(third), last.zip_high(third)]
 }
 
 impl Integrals {
@@ -136,7 +151,7 @@ impl Integrals {
         [f0, f1]: [[f32; LANES]; 2],
         table_of: impl Fn(usize) -> &'a Table,
     ) -> Means<S> {
-        let (mut near, mut far, mut whole) = (Parts::default(), Parts::default(), [[0.0; LANES]; 5]);
+        let (mut near, mut far, mut whole) = (Parts::NONE, Parts::NONE, [[0.0; LANES]; 5]);
         let (mut lows, mut sizes) = ([0.0; LANES], [0.0; LANES]);
         let mut has_far = false;
         while lanes != 0 {
@@ -164,19 +179,19 @@ impl Integrals {
             let cell = table.cell(first);
             let end = cell[1][3];
             if high < end || first + 1 == table.cells {
-                near.set(lane, &cell, [low, high], 1.0);
+                near.set(lane, cell, [low, high], 1.0);
                 continue;
             }
             let last = table.cell_of(high);
             if last == first {
-                near.set(lane, &cell, [low, high], 1.0);
+                near.set(lane, cell, [low, high], 1.0);
                 continue;
             }
             has_far = true;
             let last_cell = table.cell(last);
             let start = last_cell[0][0];
-            near.set(lane, &cell, [low, end], (end - low) / size);
-            far.set(lane, &last_cell, [start, high], (high - start) / size);
+            near.set(lane, cell, [low, end], (end - low) / size);
+            far.set(lane, last_cell, [start, high], (high - start) / size);
             if last > first + 1 {
                 let sums = table.between(first + 1, last - 1, low);
                 whole.iter_mut().zip(sums).for_each(|(lanes, sum)| lanes[lane] = sum / size);
@@ -206,21 +221,23 @@ impl Integrals {
 
     /// The sums over parts of cells, by two Gauss nodes.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn part<S: Simd>(&self, simd: S, parts: &Parts, low: f32x8<S>) -> Sums<S> {
+    fn part<S: Simd>(&self, simd: S, parts: &Parts<'_>, low: f32x8<S>) -> Sums<S> {
         let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let (from, to, weight) = (load(&parts.from), load(&parts.to), load(&parts.weight) * 0.5);
+        let [start, per_width, alpha_at_start, rise] = parts.entry(simd, 0);
+        let ([red, green, blue, _], [red_rise, green_rise, blue_rise, _]) =
+            (parts.entry(simd, 1), parts.entry(simd, 2));
         let mut sums = [zero; 5];
         for share in [0.5 - NODE as f32, 0.5 + NODE as f32] {
             let x = from + (to - from) * share;
-            let u = ((x - load(&parts.start)) * load(&parts.per_width)).max(zero).min(one);
-            let alpha = load(&parts.alpha) + load(&parts.rise) * u;
-            let m = weight * self.amount(simd, alpha);
+            let u = ((x - start) * per_width).max(zero).min(one);
+            let m = weight * self.amount(simd, alpha_at_start + rise * u);
             sums[0] += m;
             sums[1] += m * (x - low);
-            for channel in 0..3 {
-                sums[2 + channel] += m * (load(&parts.color[channel]) + load(&parts.color_rise[channel]) * u);
-            }
+            sums[2] += m * (red + red_rise * u);
+            sums[3] += m * (green + green_rise * u);
+            sums[4] += m * (blue + blue_rise * u);
         }
         sums
     }

@@ -3,8 +3,10 @@
 
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x4, f32x8, f32x16};
+use glam::UVec3;
 
 use super::{Cube, Field};
+use crate::cpu::after::differences::{Axes, Differences};
 use crate::cpu::vector::exp2;
 
 /// Voxels along a side.
@@ -61,6 +63,31 @@ impl<S: Simd> Weights<S> {
     }
 }
 
+/// The kernels around a point, without what depends on x, for each row of voxels along x: `g = along·across`, cut off at the radius.
+struct RowWeights {
+    across: [f32; SIDE * SIDE],
+    /// The square of the component of δ along x at the kernel's radius.
+    limits: [f32; SIDE * SIDE],
+}
+
+impl RowWeights {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn new<S: Simd>(simd: S, field: &Field<'_>, [_, y, z]: [f32; 3]) -> Self {
+        let offset = f32x8::load_array(simd, [y, y - 1.0, y - 2.0, y - 3.0, z, z - 1.0, z - 2.0, z - 3.0]);
+        let squared = offset * offset;
+        let (of_y, of_z) = gaussian(simd, squared * field.exponent).split();
+        let (y_squared, z_squared) = squared.split();
+        let (of_z, left) = (of_z.to_array(), (f32x4::splat(simd, field.radius_squared) - z_squared).to_array());
+        let mut rows = Self { across: [0.0; SIDE * SIDE], limits: [0.0; SIDE * SIDE] };
+        let (across, limits) = (rows.across.as_chunks_mut::<SIDE>().0, rows.limits.as_chunks_mut::<SIDE>().0);
+        for z in 0..SIDE {
+            (of_y * of_z[z]).store_array(&mut across[z]);
+            (f32x4::splat(simd, left[z]) - y_squared).store_array(&mut limits[z]);
+        }
+        rows
+    }
+}
+
 impl Field<'_> {
     /// N and `Σ c·g`. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -79,25 +106,82 @@ impl Field<'_> {
         [sum_of(total), sum_of(sum) * self.scale]
     }
 
-    /// `Σ d·g / N`, for voxels that have neighbours on either side.
+    /// `Σ d·g / N`. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn cube_differences<S: Simd>(&self, simd: S, cube: &Cube) -> [f32; 3] {
-        let weights = Weights::new(simd, self, cube.rest);
-        let ([step_y, step_z], values) = (self.steps(), self.volume.values());
-        let first = cube.index;
-        let zero = f32x16::splat(simd, 0.0);
-        let (mut total, mut x, mut y, mut z) = (zero, zero, zero, zero);
-        for plane in 0..SIDE {
-            let at = first + plane * step_z;
-            let weight = weights.at(simd, plane);
-            total += weight;
-            x += weight * (rows(simd, values, at + 1, step_y) - rows(simd, values, at - 1, step_y));
-            y += weight * (rows(simd, values, at + step_y, step_y) - rows(simd, values, at - step_y, step_y));
-            z += weight * (rows(simd, values, at + step_z, step_y) - rows(simd, values, at - step_z, step_y));
-        }
-        let per_weight = 0.5 * self.scale / sum_of(total);
+        let weights = RowWeights::new(simd, self, cube.rest);
+        let [total, x, y, z] = match self.differences {
+            Some(differences) => self.kept_differences(simd, cube, &weights, differences),
+            None => self.new_differences(simd, cube, &weights),
+        };
+        let per_weight = 0.5 * self.scale / total;
         let [per_x, per_y, per_z] = self.per_spacing;
-        [sum_of(x) * per_weight * per_x, sum_of(y) * per_weight * per_y, sum_of(z) * per_weight * per_z]
+        [x * per_weight * per_x, y * per_weight * per_y, z * per_weight * per_z]
+    }
+
+    /// N and `2·Σ d·g`, of differences that are kept: x, y and z of a row's four voxels side by side.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn kept_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights, kept: &Differences) -> [f32; 4] {
+        const VOXELS: [f32; 16] = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0];
+        let x = f32x16::splat(simd, cube.rest[0]) - f32x16::load_array(simd, VOXELS);
+        let squared = x * x;
+        let (low, high) = (squared * self.exponent).split();
+        let along = gaussian(simd, low).combine(gaussian(simd, high));
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut total, mut sums) = (zero, zero);
+        for (row, index) in self.rows_of(cube).enumerate() {
+            let is_inside = squared.simd_lt(f32x16::splat(simd, rows.limits[row]));
+            let weight = is_inside.select(along * rows.across[row], zero);
+            total += weight;
+            sums += weight * f32x16::from_slice(simd, kept.of_four(index));
+        }
+        let (total, sums) = (total.to_array(), sums.to_array());
+        let sum = |of: &[f32; 16], first: usize| (of[first] + of[first + 6]) + (of[first + 3] + of[first + 9]);
+        [sum(&total, 0), sum(&sums, 0), sum(&sums, 1), sum(&sums, 2)]
+    }
+
+    /// The same sums of the same numbers, where differences are not kept.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn new_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> [f32; 4] {
+        let (values, dims, [step_y, step_z]) = (self.volume.values(), self.extent.dims, self.steps());
+        let is_inside = cube.first.cmpgt(UVec3::ZERO).all() && (cube.first + SIDE as u32).cmplt(dims).all();
+        let axes = Axes::of(values, dims, [1, step_y, step_z]);
+        let x = f32x4::splat(simd, cube.rest[0]) - f32x4::load_array(simd, [0.0, 1.0, 2.0, 3.0]);
+        let squared = x * x;
+        let exponents = squared * self.exponent;
+        let (along, _) = gaussian(simd, exponents.combine(exponents)).split();
+        let zero = f32x4::splat(simd, 0.0);
+        let four = |at: usize| f32x4::from_slice(simd, &values[at..at + SIDE]);
+        let [mut total, mut x, mut y, mut z] = [zero; 4];
+        for (row, index) in self.rows_of(cube).enumerate() {
+            let is_near = squared.simd_lt(f32x4::splat(simd, rows.limits[row]));
+            let weight = is_near.select(along * rows.across[row], zero);
+            total += weight;
+            if is_inside {
+                x += weight * (four(index + 1) - four(index - 1));
+                y += weight * (four(index + step_y) - four(index - step_y));
+                z += weight * (four(index + step_z) - four(index - step_z));
+            } else {
+                let first = cube.first + UVec3::new(0, (row % SIDE) as u32, (row / SIDE) as u32);
+                let voxel = |x: usize| axes.at(index + x, first.with_x(first.x + x as u32));
+                let [a, b, c, d] = [voxel(0), voxel(1), voxel(2), voxel(3)];
+                x += weight * f32x4::load_array(simd, [a[0], b[0], c[0], d[0]]);
+                y += weight * f32x4::load_array(simd, [a[1], b[1], c[1], d[1]]);
+                z += weight * f32x4::load_array(simd, [a[2], b[2], c[2], d[2]]);
+            }
+        }
+        let sum = |of: f32x4<S>| {
+            let [a, b, c, d] = of.to_array();
+            (a + c) + (b + d)
+        };
+        [sum(total), sum(x), sum(y), sum(z)]
+    }
+
+    /// The indices of the first voxels of a cube's rows along x.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn rows_of(&self, cube: &Cube) -> impl Iterator<Item = usize> {
+        let ([step_y, step_z], first) = (self.steps(), cube.index);
+        (0..SIDE * SIDE).map(move |row| first + row % SIDE * step_y + row / SIDE * step_z)
     }
 
     /// `Σ (c - f)·g·δ / N`, given f.

@@ -10,9 +10,10 @@ mod rows;
 use std::f64::consts::LOG2_E;
 
 use fearless_simd::Simd;
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 
 use super::colors::ColorsOf;
+use super::differences::Differences;
 use super::held::{Extent, Held};
 use super::low_pass::LowPass;
 use super::planes::{Eight, Points};
@@ -39,6 +40,8 @@ pub(super) struct Field<'a> {
     coefficients: &'a [f32],
     /// Those of the voxels' own colours, if they have any.
     colors: Option<ColorsOf<'a>>,
+    /// The differences of the values, if they are kept.
+    differences: Option<&'a Differences>,
     numbers: Normalization,
     radius: f64,
     radius_squared: f32,
@@ -64,12 +67,23 @@ pub(super) struct Field<'a> {
 /// 4×4×4 voxels of a volume, as a point sees them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cube {
-    /// The index of the first voxel among those at hand.
+    /// The first voxel, and its index among those at hand.
+    first: UVec3,
     index: usize,
     /// From the first voxel to the point.
     rest: [f32; 3],
-    /// Whether all voxels have neighbours on either side.
-    is_inside: bool,
+}
+
+impl Cube {
+    /// One of eight.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn of(Eight { cells: [x, y, z], rest, indices }: &Eight, lane: usize) -> Self {
+        Self {
+            first: UVec3::new(x[lane] as u32, y[lane] as u32, z[lane] as u32),
+            index: indices[lane] as usize,
+            rest: [rest[0][lane], rest[1][lane], rest[2][lane]],
+        }
+    }
 }
 
 /// The largest power of two that is at most a normal positive number.
@@ -83,6 +97,7 @@ impl<'a> Field<'a> {
     pub(super) fn new(
         (volume, extent): (&'a Volume, Extent),
         (coefficients, colors): (&'a [f32], Option<ColorsOf<'a>>),
+        differences: Option<&'a Differences>,
         numbers: Normalization,
         (radius, falloff): (f64, f64),
         gradient: Gradient,
@@ -96,6 +111,7 @@ impl<'a> Field<'a> {
             extent,
             coefficients,
             colors,
+            differences,
             numbers,
             radius,
             radius_squared: (radius * radius) as f32,
@@ -107,7 +123,7 @@ impl<'a> Field<'a> {
             per_spacing: in_f32(1.0 / spacing),
             per_moment: in_f32(-2.0 * falloff / spacing),
             min_moment: min_moment(radius, numbers.range).powi(2),
-            is_cube: radius <= CUBE_RADIUS && is_moderate && extent.dims.min_element() as usize >= cube::SIDE,
+            is_cube: Self::is_narrow(radius) && is_moderate && extent.dims.min_element() as usize >= cube::SIDE,
         }
     }
 
@@ -115,7 +131,12 @@ impl<'a> Field<'a> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn of<'b>(&self, held: &'b Held) -> Field<'b> {
         let volume = &held.volume;
-        Field { volume, extent: held.extent, coefficients: volume.values(), colors: None, ..*self }
+        Field { volume, extent: held.extent, coefficients: volume.values(), colors: None, differences: None, ..*self }
+    }
+
+    /// Whether a kernel reaches no farther than the 4×4×4 voxels around a point.
+    pub(super) fn is_narrow(radius: f64) -> bool {
+        radius <= CUBE_RADIUS
     }
 
     /// The distance of voxels from a point that its value needs, by axis, where kernels reach some distance: those of its cube, too; and with
@@ -147,21 +168,6 @@ impl<'a> Field<'a> {
         Some(points.eight(simd, &self.extent, [1, side - 1], at))
     }
 
-    /// One of eight cubes.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cube(&self, eight: &Eight, lane: usize) -> Cube {
-        let dims = self.extent.dims;
-        let is_inside = |axis: usize, dim: u32| {
-            let first = eight.cells[axis][lane];
-            first > 0 && first + (cube::SIDE as i32) < dim as i32
-        };
-        Cube {
-            index: eight.indices[lane] as usize,
-            rest: [eight.rest[0][lane], eight.rest[1][lane], eight.rest[2][lane]],
-            is_inside: is_inside(0, dims.x) && is_inside(1, dims.y) && is_inside(2, dims.z),
-        }
-    }
-
     /// f at a point, as a number; NaN where there is no value.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn value<S: Simd>(
@@ -172,7 +178,7 @@ impl<'a> Field<'a> {
         (at, low_pass): (DVec3, &LowPass),
     ) -> f32 {
         if let Some(cubes) = cubes {
-            let [weight, sum] = self.cube_sums(simd, &self.cube(cubes, lane));
+            let [weight, sum] = self.cube_sums(simd, &Cube::of(cubes, lane));
             // Otherwise a hole is near.
             if sum.is_finite() {
                 return if weight >= MIN_WEIGHT { sum / weight } else { f32::NAN };
@@ -191,9 +197,7 @@ impl<'a> Field<'a> {
         (at, low_pass): (DVec3, &LowPass),
         number: f32,
     ) -> [f32; 3] {
-        if let Some(cube) = cubes.map(|cubes| self.cube(cubes, lane))
-            && (cube.is_inside || self.gradient == Gradient::Kernel)
-        {
+        if let Some(cube) = cubes.map(|cubes| Cube::of(cubes, lane)) {
             let gradient = match self.gradient {
                 Gradient::Differences => self.cube_differences(simd, &cube),
                 Gradient::Kernel => self.kernel_gradient(self.cube_moments(simd, &cube, number)),
@@ -257,7 +261,10 @@ mod tests {
         let numbers = Normalization::of(volume.values().iter().copied()).unwrap();
         let kernel = (splatting.radius, splatting.falloff);
         let whole = (volume, Extent::whole(grid));
-        let ours = Field::new(whole, (volume.values(), None), numbers, kernel, scene.shading.gradient);
+        let differences = Differences::new(volume).unwrap();
+        let [ours, keeping] = [None, Some(&differences)].map(|differences| {
+            Field::new(whole, (volume.values(), None), differences, numbers, kernel, scene.shading.gradient)
+        });
         let expected = twin::Field::new(volume, &scene).unwrap();
         let view = ViewGeometry::new(grid, &scene.camera, splatting, [64, 64]).unwrap();
         let geometry = PlaneGeometry::new(&view, grid);
@@ -279,11 +286,13 @@ mod tests {
             for lane in 0..8 {
                 let at = points.of(lane, 0);
                 let of = (points, low_pass);
-                let (number, gradient) = dispatch!(Level::new(), simd => {
+                let (number, [gradient, kept]) = dispatch!(Level::new(), simd => {
                     let cubes = ours.cubes(simd, &of, [0, 0]);
                     let number = ours.value(simd, cubes.as_ref(), lane, (at, &low_pass));
-                    (number, ours.gradient(simd, cubes.as_ref(), lane, (at, &low_pass), number))
+                    let gradient = |field: &Field<'_>| field.gradient(simd, cubes.as_ref(), lane, (at, &low_pass), number);
+                    (number, [gradient(&ours), gradient(&keeping)])
                 });
+                assert_eq!(kept.map(f32::to_bits), gradient.map(f32::to_bits), "{at} {sets:?}");
                 let value = expected.value(at, &twins);
                 assert_eq!(number.is_nan(), value.is_none(), "{at} {sets:?}");
                 let Some(value) = value else { continue };
@@ -352,7 +361,7 @@ mod tests {
             let own = Colors::new(&volume, interpolation, (radius, falloff)).unwrap().unwrap();
             let coefficients = (volume.values(), own.of(&volume));
             let whole = (&volume, Extent::whole(volume.grid()));
-            let ours = Field::new(whole, coefficients, numbers, (radius, falloff), Gradient::Differences);
+            let ours = Field::new(whole, coefficients, None, numbers, (radius, falloff), Gradient::Differences);
             let theirs = twin::Field::new(&volume, &scene).unwrap();
             let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [512, 512]).unwrap();
             let low_pass = LowPass::new(&PlaneGeometry::new(&view, volume.grid()), 1.0);
