@@ -84,7 +84,7 @@ impl Kernel {
         const STEPS: usize = 16;
         let reach = self.radius.ceil() as usize;
         let cosines: Vec<Vec<f64>> = (0..=STEPS)
-            .map(|step| (0..=reach).map(|offset| (PI * (step * offset) as f64 / STEPS as f64).cos()).collect())
+            .map(|step| (0..=reach).map(|offset| libm::cos(PI * (step * offset) as f64 / STEPS as f64)).collect())
             .collect();
         // Offsets come in pairs ±d along each axis.
         let count = |offset: usize| if offset == 0 { 1.0 } else { 2.0 };
@@ -93,7 +93,7 @@ impl Kernel {
             .map(|offset| (offset, offset.map(|d| (d * d) as f64).iter().sum::<f64>()))
             .filter(|(_, squared)| *squared < self.radius * self.radius)
             .map(|(offset, squared)| {
-                (offset, (-self.falloff * squared).exp() * offset.map(count).iter().product::<f64>())
+                (offset, libm::exp(-self.falloff * squared) * offset.map(count).iter().product::<f64>())
             })
             .collect();
         let response = |frequency: [usize; 3]| {

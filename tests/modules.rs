@@ -59,3 +59,35 @@ fn no_modules_import_each_other_in_a_cycle() {
         }
     }
 }
+
+/// The standard library's functions are the system's, whose last bits differ between machines (SPEC §12). What only the f64 evaluation, the program's texts and the
+/// report of a comparison need may use them.
+#[test]
+fn functions_of_numbers_are_those_of_libm() {
+    const FUNCTIONS: [&str; 21] = [
+        "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "exp2",
+        "exp_m1", "ln", "ln_1p", "log2", "log10", "powf", "cbrt", "hypot",
+    ];
+    const EXEMPT: [&str; 4] = ["src/bin", "src/reference", "src/reference.rs", "src/golden/comparison.rs"];
+    fn scan(root: &Path, path: &Path, lines: &mut usize, found: &mut Vec<String>) {
+        if EXEMPT.iter().any(|exempt| path == root.join(exempt)) {
+            return;
+        }
+        if path.is_dir() {
+            fs::read_dir(path).unwrap().for_each(|entry| scan(root, &entry.unwrap().path(), lines, found));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(path).unwrap();
+            for line in text.lines().take_while(|line| *line != "#[cfg(test)]") {
+                *lines += 1;
+                if FUNCTIONS.iter().any(|function| line.contains(&format!(".{function}("))) {
+                    found.push(format!("{}: {line}", path.display()));
+                }
+            }
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut lines, mut found) = (0, Vec::new());
+    scan(root, &root.join("src"), &mut lines, &mut found);
+    assert!(lines > 20_000, "only {lines} lines");
+    assert!(found.is_empty(), "{found:#?}");
+}

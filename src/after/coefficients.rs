@@ -260,7 +260,7 @@ fn conjugate_gradients(
             return Some(c);
         }
         // The error falls by about the same factor in every step.
-        progress(((begin / left).ln() / (begin / tolerance).ln()).clamp(0.0, 1.0));
+        progress((libm::log(begin / left) / libm::log(begin / tolerance)).clamp(0.0, 1.0));
         let image = taps.convolve(grid, &direction, &is_hole);
         let step = squared / dot(&direction, &image);
         c.par_iter_mut().zip(&direction).for_each(|(c, direction)| *c += step as f32 * direction);

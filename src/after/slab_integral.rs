@@ -314,5 +314,5 @@ fn amount_f32(compositing: Compositing, alpha: f32) -> f32 {
     if alpha < 0.0625 {
         return alpha * (1.0 + alpha * (0.5 + alpha * (1.0 / 3.0 + alpha * (0.25 + alpha * 0.2))));
     }
-    -(1.0 - alpha.min(0.9999)).ln()
+    -libm::logf(1.0 - alpha.min(0.9999))
 }

@@ -81,7 +81,7 @@ fn summed_area(kernel: &Kernel) -> FootprintTable {
     let texels = (0..SUMMED_AREA_LAYERS).flat_map(|layer| {
         let z = spacing * f64::from(layer);
         quadrant(SUMMED_AREA_SIZE, texel).flat_map(move |(a, b)| {
-            let derivative = spacing * kernel.value(0.0) * (-kernel.falloff() * (a * a + b * b + z * z)).exp();
+            let derivative = spacing * kernel.value(0.0) * libm::exp(-kernel.falloff() * (a * a + b * b + z * z));
             [kernel.cumulative_beyond(a * a + b * b, z) as f32, derivative as f32]
         })
     });

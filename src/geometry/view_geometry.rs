@@ -327,7 +327,7 @@ impl ViewGeometry {
             // The low-pass rule adds at most what the ellipse's axes lack of `support`; an ellipsoid is at least a `unit` thick. The sum is
             // largest where pixels are smallest, so boxes shrink towards the back.
             let thinnest = eye.pix(nearest).recip().min(1.0);
-            pixels.hypot(support * (1.0 - thinnest * thinnest).sqrt())
+            libm::hypot(pixels, support * (1.0 - thinnest * thinnest).sqrt())
         };
         DVec2::new(half_box(self.basis.u, half.x), half_box(self.basis.v, half.y))
     }

@@ -97,7 +97,7 @@ fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, Render
     // The image's centre is the point of the central ray beside the volume's centre, if that is visible.
     let distance = (-eye.dot(ahead)).max(near);
     let projection = Projection::Perspective {
-        fov_y: 2.0 * up.length().recip().atan().to_degrees(),
+        fov_y: 2.0 * libm::atan(up.length().recip()).to_degrees(),
         distance: Some(distance),
         near: Some(near),
     };
@@ -118,7 +118,7 @@ fn check_screen(right: DVec3, up: DVec3, pixels: DVec2) -> Result<(), RenderErro
     }
     let cosine = right.dot(up) / (right.length() * up.length());
     if cosine.abs() > TOLERANCE {
-        let angle = cosine.acos().to_degrees();
+        let angle = libm::acos(cosine).to_degrees();
         return Err(refused(format!("a sheared image, whose axes are {angle:.4}° apart"), "axes 90° apart"));
     }
     if (width / height - 1.0).abs() > TOLERANCE {

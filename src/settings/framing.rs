@@ -55,7 +55,7 @@ impl Extent {
         let radius = (self.high - self.low).length() / 2.0;
         let [width, height] = size.map(f64::from);
         self.filled(camera, &|| 2.0 * radius * (height / width).max(1.0) / SHARE, &|tangent| {
-            radius / (SHARE * tangent * (width / height).min(1.0)).atan().sin()
+            radius / libm::sin(libm::atan(SHARE * tangent * (width / height).min(1.0)))
         })
     }
 
@@ -67,7 +67,7 @@ impl Extent {
         let projection = match camera.projection {
             Projection::Orthographic { height: None } => Projection::Orthographic { height: Some(height()) },
             Projection::Perspective { fov_y, distance: None, near } => {
-                let distance = Some(distance((fov_y.to_radians() / 2.0).tan()));
+                let distance = Some(distance(libm::tan(fov_y.to_radians() / 2.0)));
                 Projection::Perspective { fov_y, distance, near }
             }
             given => given,

@@ -19,14 +19,14 @@ pub fn orbit(camera: &mut Camera, degrees: DVec2) {
     let horizontal = w.reject_from_normalized(up).normalize();
     let azimuth = DMat3::from_axis_angle(up, -degrees.x.to_radians());
     let elevation = (elevation(camera) + degrees.y).clamp(-MAX_ELEVATION, MAX_ELEVATION);
-    let (sine, cosine) = elevation.to_radians().sin_cos();
+    let (sine, cosine) = libm::sincos(elevation.to_radians());
     camera.direction = azimuth * horizontal * cosine - up * sine;
 }
 
 /// The degrees of the eye over the plane through the camera's centre that is perpendicular to `up`.
 pub fn elevation(camera: &Camera) -> f64 {
     let (up, w) = (scaled(camera.up).normalize(), scaled(camera.direction).normalize());
-    -w.dot(up).clamp(-1.0, 1.0).asin().to_degrees()
+    -libm::asin(w.dot(up).clamp(-1.0, 1.0)).to_degrees()
 }
 
 /// The height of the image in world units, at the depth of the camera's centre.
@@ -38,8 +38,8 @@ pub fn height(camera: &Camera, grid: &Grid, kernel_radius: f64, size: [u32; 2]) 
             .unwrap_or(grid.bounding_radius(kernel_radius)),
         Projection::Perspective { fov_y, distance, .. } => {
             let half_angle = fov_y.to_radians() / 2.0;
-            let whole = grid.bounding_radius(kernel_radius) / half_angle.sin();
-            2.0 * half_angle.tan() * distance.unwrap_or(whole)
+            let whole = grid.bounding_radius(kernel_radius) / libm::sin(half_angle);
+            2.0 * libm::tan(half_angle) * distance.unwrap_or(whole)
         }
     }
 }
@@ -52,7 +52,7 @@ pub fn zoom(camera: &mut Camera, grid: &Grid, height: f64, factor: f64) {
     match &mut camera.projection {
         Projection::Orthographic { height: given } => *given = Some(height),
         Projection::Perspective { fov_y, distance, .. } => {
-            *distance = Some(height / (2.0 * (fov_y.to_radians() / 2.0).tan()));
+            *distance = Some(height / (2.0 * libm::tan(fov_y.to_radians() / 2.0)));
         }
     }
 }

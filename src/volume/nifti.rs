@@ -92,7 +92,7 @@ fn magnitudes<T: Voxel>(
     samples.reserve::<T>(&header.path, access)?;
     let mut values = Vec::new();
     for &[real, imaginary] in parts.as_chunks().0 {
-        let magnitude = (f64::from(real) * slope + intercept).hypot(f64::from(imaginary) * slope);
+        let magnitude = libm::hypot(f64::from(real) * slope + intercept, f64::from(imaginary) * slope);
         values.push(T::of(magnitude).ok_or_else(|| header.invalid("data", magnitude, T::ALLOWED))?);
     }
     Ok(values)

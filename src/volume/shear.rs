@@ -91,7 +91,7 @@ impl Lattice {
         let (y, b_length) = split(steps[b] - steps[b].dot(x) * x);
         let (c_along_x, c_along_y) = (along(c, x), along(c, y));
         let (z, c_length) = split(steps[c] - steps[c].dot(x) * x - steps[c].dot(y) * y);
-        let angle = |orthogonal: f64, length: f64| (orthogonal / length).clamp(0.0, 1.0).acos().to_degrees();
+        let angle = |orthogonal: f64, length: f64| libm::acos((orthogonal / length).clamp(0.0, 1.0)).to_degrees();
         let degrees = angle(b_length, lengths[b]).max(angle(c_length, lengths[c]));
         if degrees.is_nan() || degrees > MAX_DEGREES {
             return Err(format!("axes at {degrees:.2}° from a right angle"));
