@@ -4,7 +4,7 @@
 //! same bits. Polynomials are Chebyshev interpolants, good to the last few bits of an `f32`.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x8, u32x8};
+use fearless_simd::{f32x4, f32x8, u32x8};
 
 /// Numbers in a vector.
 pub(super) const LANES: usize = 8;
@@ -23,6 +23,21 @@ const ATANH: [f32; 5] = [1.0, 0.333_333_34, 0.200_001_92, 0.142_675_14, 0.118_08
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn iota<S: Simd>(simd: S) -> f32x8<S> {
     f32x8::load_array(simd, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
+}
+
+/// Eight rows of four numbers, as four columns.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(super) fn columns<S: Simd>(simd: S, rows: [&[f32; 4]; LANES]) -> [f32x8<S>; 4] {
+    let row = |at: usize| f32x4::load_array_ref(simd, rows[at]);
+    let [a, b, c, d] = transposed([row(0), row(1), row(2), row(3)]);
+    let [e, f, g, h] = transposed([row(4), row(5), row(6), row(7)]);
+    [a.combine(e), b.combine(f), c.combine(g), d.combine(h)]
+}
+
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
+    let ([first, last], [second, third]) = ([a.zip_low(c), a.zip_high(c)], [b.zip_low(d), b.zip_high(d)]);
+    [first.zip_low(second), first.zip_high(second), last.zip_low(third), last.zip_high(third)]
 }
 
 /// `2^x` as `2^n` and `2^f - 1`, with `x = n + f` and n whole, for x from -126 to 126.

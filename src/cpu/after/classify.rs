@@ -161,12 +161,8 @@ impl Frame<'_> {
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
-                let cubes = field.cubes(simd, of, [column, row]);
-                for lane in bits(missing.into()) {
-                    let (lane, column) = (lane as usize, column + lane as usize);
-                    let point = (of.0.of(column, row), &of.1);
-                    values[column] = field.value(simd, cubes.as_ref(), lane, point);
-                }
+                let new = field.values(simd, of, [column, row], missing);
+                bits(missing.into()).for_each(|lane| values[column + lane as usize] = new[lane as usize]);
             },
         );
     }

@@ -3,12 +3,12 @@
 
 use std::collections::BTreeMap;
 
+use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x4, f32x8};
 
 use crate::after::normalization::Normalization;
 use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
-use crate::cpu::vector::{LANES, optical_depth};
+use crate::cpu::vector::{LANES, columns, optical_depth};
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
 
@@ -103,18 +103,9 @@ impl<'a> Parts<'a> {
     /// The numbers of an entry of the cells, by lane.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn entry<S: Simd>(&self, simd: S, entry: usize) -> [f32x8<S>; 4] {
-        let row = |lane: usize| f32x4::load_array_ref(simd, &self.cells[lane][entry]);
-        let [a, b, c, d] = transposed([row(0), row(1), row(2), row(3)]);
-        let [e, f, g, h] = transposed([row(4), row(5), row(6), row(7)]);
-        [a.combine(e), b.combine(f), c.combine(g), d.combine(h)]
+        let [a, b, c, d, e, f, g, h] = self.cells;
+        columns(simd, [&a[entry], &b[entry], &c[entry], &d[entry], &e[entry], &f[entry], &g[entry], &h[entry]])
     }
-}
-
-/// Rows as columns.
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
-    let ([first, last], [second, third]) = ([a.zip_low(c), a.zip_high(c)], [b.zip_low(d), b.zip_high(d)]);
-    [first.zip_low(second), first.zip_high(second), last.zip_low(third), last.zip_high(third)]
 }
 
 impl Integrals {

@@ -7,7 +7,7 @@ use glam::UVec3;
 
 use super::{Cube, Field};
 use crate::cpu::after::differences::{Axes, Differences};
-use crate::cpu::vector::exp2;
+use crate::cpu::vector::{LANES, columns, exp2};
 
 /// Voxels along a side.
 pub(super) const SIDE: usize = 4;
@@ -89,9 +89,9 @@ impl RowWeights {
 }
 
 impl Field<'_> {
-    /// N and `Σ c·g`. Not finite if a hole is near.
+    /// N and `Σ (c - base)·g`, each as four numbers to be added. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn cube_sums<S: Simd>(&self, simd: S, cube: &Cube) -> [f32; 2] {
+    pub(super) fn cube_sums<S: Simd>(&self, simd: S, cube: &Cube) -> [f32x4<S>; 2] {
         let weights = Weights::new(simd, self, cube.rest);
         let [step_y, step_z] = self.steps();
         let first = cube.index;
@@ -103,7 +103,7 @@ impl Field<'_> {
             total += weight;
             sum += weight * c;
         }
-        [sum_of(total), sum_of(sum) * self.scale]
+        [quarters(total), quarters(sum)]
     }
 
     /// `Σ d·g / N`. Not finite if a hole is near.
@@ -229,11 +229,24 @@ fn rows<S: Simd>(simd: S, all: &[f32], at: usize, step: usize) -> f32x16<S> {
     low.combine(high)
 }
 
+/// Four sums of four of sixteen numbers each.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn quarters<S: Simd>(numbers: f32x16<S>) -> f32x4<S> {
+    let (low, high) = numbers.split();
+    let (low, high) = (low + high).split();
+    low + high
+}
+
 /// The sum of sixteen numbers, in the same order on every machine.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn sum_of<S: Simd>(numbers: f32x16<S>) -> f32 {
-    let (low, high) = numbers.split();
-    let (low, high) = (low + high).split();
-    let [a, b, c, d] = (low + high).to_array();
+    let [a, b, c, d] = quarters(numbers).to_array();
     (a + c) + (b + d)
+}
+
+/// The sums of four numbers for each of eight points, in that order.
+#[cfg_attr(not(debug_assertions), inline(always))]
+pub(super) fn sums_of<S: Simd>(simd: S, [a, b, c, d, e, f, g, h]: &[[f32; SIDE]; LANES]) -> f32x8<S> {
+    let [first, second, third, fourth] = columns(simd, [a, b, c, d, e, f, g, h]);
+    (first + third) + (second + fourth)
 }

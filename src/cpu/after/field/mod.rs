@@ -9,7 +9,8 @@ mod rows;
 
 use std::f64::consts::LOG2_E;
 
-use fearless_simd::Simd;
+use fearless_simd::f32x8;
+use fearless_simd::prelude::*;
 use glam::{DVec3, UVec3};
 
 use super::colors::ColorsOf;
@@ -18,6 +19,8 @@ use super::held::{Extent, Held};
 use super::low_pass::LowPass;
 use super::planes::{Eight, Points};
 use crate::after::normalization::Normalization;
+use crate::cpu::count::bits;
+use crate::cpu::vector::LANES;
 use crate::settings::shading::Gradient;
 use crate::volume::Volume;
 
@@ -168,23 +171,37 @@ impl<'a> Field<'a> {
         Some(points.eight(simd, &self.extent, [1, side - 1], at))
     }
 
-    /// f at a point, as a number; NaN where there is no value.
+    /// f, as numbers, at those of eight points of a plane that have a bit; NaN where there is no value.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn value<S: Simd>(
+    pub(super) fn values<S: Simd>(
         &self,
         simd: S,
-        cubes: Option<&Eight>,
-        lane: usize,
-        (at, low_pass): (DVec3, &LowPass),
-    ) -> f32 {
-        if let Some(cubes) = cubes {
-            let [weight, sum] = self.cube_sums(simd, &Cube::of(cubes, lane));
-            // Otherwise a hole is near.
-            if sum.is_finite() {
-                return if weight >= MIN_WEIGHT { sum / weight } else { f32::NAN };
+        of: &(Points, LowPass),
+        [column, row]: [usize; 2],
+        lanes: u32,
+    ) -> [f32; LANES] {
+        let mut values = [f32::NAN; LANES];
+        let mut left = lanes;
+        if let Some(cubes) = self.cubes(simd, of, [column, row]) {
+            let (mut weights, mut sums) = ([[0.0; cube::SIDE]; LANES], [[0.0; cube::SIDE]; LANES]);
+            for lane in bits(lanes.into()) {
+                let lane = lane as usize;
+                let [weight, sum] = self.cube_sums(simd, &Cube::of(&cubes, lane));
+                weight.store_array(&mut weights[lane]);
+                sum.store_array(&mut sums[lane]);
             }
+            let (weight, sum) = (cube::sums_of(simd, &weights), cube::sums_of(simd, &sums) * self.scale);
+            let has_value = weight.simd_ge(f32x8::splat(simd, MIN_WEIGHT));
+            has_value.select(sum / weight, f32x8::splat(simd, f32::NAN)).store_array(&mut values);
+            // Where the sum is not finite a hole is near.
+            let is_finite = sum.abs().simd_le(f32x8::splat(simd, f32::MAX));
+            left &= !(is_finite.to_bitmask() as u32);
         }
-        self.row_value(simd, at, low_pass)
+        for lane in bits(left.into()) {
+            let lane = lane as usize;
+            values[lane] = self.row_value(simd, of.0.of(column + lane, row), &of.1);
+        }
+        values
     }
 
     /// ∇f in numbers per world unit, at a point whose f is `number`.
@@ -288,7 +305,7 @@ mod tests {
                 let of = (points, low_pass);
                 let (number, [gradient, kept]) = dispatch!(Level::new(), simd => {
                     let cubes = ours.cubes(simd, &of, [0, 0]);
-                    let number = ours.value(simd, cubes.as_ref(), lane, (at, &low_pass));
+                    let number = ours.values(simd, &of, [0, 0], 1 << lane)[lane];
                     let gradient = |field: &Field<'_>| field.gradient(simd, cubes.as_ref(), lane, (at, &low_pass), number);
                     (number, [gradient(&ours), gradient(&keeping)])
                 });
