@@ -86,7 +86,13 @@ fn the_native_backend_draws_the_goldens_byte_by_byte() {
         }
     }
     let cpu = Headless::new(&HeadlessOptions::default().with_backend(Backend::Cpu)).unwrap();
+    let named = std::env::var("SHEETSPLAT_SIMD").ok();
     let check = |name: &str, rendering: &Rendering| {
+        assert!(
+            named.as_ref().is_none_or(|named| *named == rendering.stats.driver),
+            "{name}: {}",
+            rendering.stats.driver
+        );
         let golden = golden!(name).unwrap().tolerance(Tolerance::EXACT).failures(failures().join("cpu"));
         golden.check(rendering).err().map(|complaint| complaint.to_string())
     };

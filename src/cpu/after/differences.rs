@@ -8,7 +8,7 @@ use crate::volume::Volume;
 /// The maximum number of voxels of a volume whose differences are kept, which then take 192 MiB.
 const MAX_VOXELS: u64 = 1 << 24;
 
-/// Twice what the value grows by from a voxel to the next one, along x, y and z, for all voxels in memory order; NaN beside a hole.
+/// `2·d` times the spacing, along x, y and z, for all voxels in memory order; d is the estimate of the gradient by differences. NaN beside a hole.
 #[derive(Clone, Debug)]
 pub(super) struct Differences(Vec<f32>);
 
@@ -27,10 +27,10 @@ impl Differences {
         let mut all = vec![0.0; count + Self::PADDING];
         all[..count].par_chunks_mut(3 * nx * ny).zip(0..dims.z).for_each(|(plane, z)| {
             for (row, y) in plane.chunks_mut(3 * nx).zip(0..) {
-                let axes = Axes::of(volume.values(), dims, [1, nx, nx * ny]);
+                let neighbours = Neighbours::of(volume.values(), dims, [1, nx, nx * ny]);
                 let first = nx * (y as usize + ny * z as usize);
                 for (of_voxel, x) in row.as_chunks_mut().0.iter_mut().zip(0..) {
-                    *of_voxel = axes.at(first + x as usize, UVec3::new(x, y, z));
+                    *of_voxel = neighbours.at(first + x as usize, UVec3::new(x, y, z));
                 }
             }
         });
@@ -46,13 +46,13 @@ impl Differences {
 
 /// A volume's values, its voxels along each axis, and the steps in memory along each.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axes<'a> {
+pub(super) struct Neighbours<'a> {
     values: &'a [f32],
     dims: UVec3,
     steps: [usize; 3],
 }
 
-impl<'a> Axes<'a> {
+impl<'a> Neighbours<'a> {
     pub(super) fn of(values: &'a [f32], dims: UVec3, steps: [usize; 3]) -> Self {
         Self { values, dims, steps }
     }

@@ -16,8 +16,9 @@ use crate::settings::transfer_function::TransferFunction;
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     points: Vec<[f32; 4]>,
+    /// How many of the points are bins.
     bin_count: usize,
-    cells: usize,
+    cells: Vec<Cell>,
     /// The min and the max number with an opacity.
     shown: [f32; 2],
     /// The min number, bins per number, the max number.
@@ -66,13 +67,9 @@ type Sums<S> = [f32x8<S>; 5];
 impl Table {
     fn new(points: Vec<[f32; 4]>) -> Self {
         let ([cells, bin_count, low, high], bins) = (points[0], points[1]);
-        Self { bin_count: bin_count as usize, cells: cells as usize, shown: [low, high], bins, points }
-    }
-
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cell(&self, cell: usize) -> &Cell {
-        let at = HEAD + self.bin_count + CELL * cell;
-        self.points.get(at..).and_then(<[_]>::first_chunk).unwrap_or(&EMPTY)
+        let bin_count = bin_count as usize;
+        let cells = points[HEAD + bin_count..][..CELL * cells as usize].as_chunks().0.to_vec();
+        Self { bin_count, cells, shown: [low, high], bins, points }
     }
 
     /// The cell of a number in the table's range.
@@ -83,7 +80,7 @@ impl Table {
         let [mut first, mut last, ..] = self.points[HEAD + bin].map(|cell| cell as usize);
         while first < last {
             let middle = (first + last).div_ceil(2);
-            if self.cell(middle)[0][0] <= x { first = middle } else { last = middle - 1 }
+            if self.cells[middle][0][0] <= x { first = middle } else { last = middle - 1 }
         }
         first
     }
@@ -167,9 +164,9 @@ impl Integrals {
             let size = high - low;
             (lows[lane], sizes[lane]) = (low, size);
             let first = table.cell_of(low);
-            let cell = table.cell(first);
+            let cell = &table.cells[first];
             let end = cell[1][3];
-            if high < end || first + 1 == table.cells {
+            if high < end || first + 1 == table.cells.len() {
                 near.set(lane, cell, [low, high], 1.0);
                 continue;
             }
@@ -179,7 +176,7 @@ impl Integrals {
                 continue;
             }
             has_far = true;
-            let last_cell = table.cell(last);
+            let last_cell = &table.cells[last];
             let start = last_cell[0][0];
             near.set(lane, cell, [low, end], (end - low) / size);
             far.set(lane, last_cell, [start, high], (high - start) / size);
@@ -247,7 +244,7 @@ impl Table {
     /// The sums over whole cells, from one to another, moments from a number.
     fn between(&self, first: usize, last: usize, low: f32) -> [f32; 5] {
         let level = (first ^ last).max(1).ilog2() as usize;
-        let sums = HEAD + self.points[0][1] as usize + self.cells * (CELL + SUM * level);
+        let sums = HEAD + self.bin_count + self.cells.len() * (CELL + SUM * level);
         let mut total = [0.0; 5];
         for cell in [first, last].into_iter().take(if first == last { 1 } else { 2 }) {
             let [m, moment, middle, _] = self.points[sums + SUM * cell];

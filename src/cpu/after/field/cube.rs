@@ -6,7 +6,7 @@ use fearless_simd::{f32x4, f32x8, f32x16};
 use glam::UVec3;
 
 use super::{Cube, Field};
-use crate::cpu::after::differences::{Axes, Differences};
+use crate::cpu::after::differences::{Differences, Neighbours};
 use crate::cpu::vector::{LANES, columns, exp2};
 
 /// Voxels along a side.
@@ -145,7 +145,7 @@ impl Field<'_> {
     fn new_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> [f32; 4] {
         let (values, dims, [step_y, step_z]) = (self.volume.values(), self.extent.dims, self.steps());
         let is_inside = cube.first.cmpgt(UVec3::ZERO).all() && (cube.first + SIDE as u32).cmplt(dims).all();
-        let axes = Axes::of(values, dims, [1, step_y, step_z]);
+        let neighbours = Neighbours::of(values, dims, [1, step_y, step_z]);
         let x = f32x4::splat(simd, cube.rest[0]) - f32x4::load_array(simd, [0.0, 1.0, 2.0, 3.0]);
         let squared = x * x;
         let exponents = squared * self.exponent;
@@ -163,7 +163,7 @@ impl Field<'_> {
                 z += weight * (four(index + step_z) - four(index - step_z));
             } else {
                 let first = cube.first + UVec3::new(0, (row % SIDE) as u32, (row / SIDE) as u32);
-                let voxel = |x: usize| axes.at(index + x, first.with_x(first.x + x as u32));
+                let voxel = |x: usize| neighbours.at(index + x, first.with_x(first.x + x as u32));
                 let [a, b, c, d] = [voxel(0), voxel(1), voxel(2), voxel(3)];
                 x += weight * f32x4::load_array(simd, [a[0], b[0], c[0], d[0]]);
                 y += weight * f32x4::load_array(simd, [a[1], b[1], c[1], d[1]]);
