@@ -72,6 +72,8 @@ for (const [backend, size] of [["cpu", SMALL], ["gpu", TINY]]) {
         const whole = fixture("itk.nrrd");
         await drop(shown, [{ name: "cut.nrrd", bytes: whole.subarray(0, whole.length - 5) }]);
         assert.match(await text(shown, "#problem"), /^cut\.nrrd: /);
+        await drop(shown, [{ name: "bzip2.nrrd", bytes: fixture("bzip2.nrrd") }]);
+        assert.match(await text(shown, "#problem"), /^bzip2\.nrrd: encoding: found "?bzip2"?, allowed: raw, .*not compiled in: bzip2/);
         await drop(shown, [{ name: "letter.txt", bytes: Buffer.from("Dear Sir") }]);
         assert.match(await text(shown, "#problem"), /^letter\.txt: format: found "\.txt", allowed: NRRD/);
         await drop(shown, [{ name: "list.nhdr" }]);
