@@ -11,13 +11,27 @@
 // Those of the voxels' own, if they have any.
 @group(0) @binding(15) var colors: texture_2d_array<u32>;
 
-// A kernel's sections begin at a group's near plane, and nothing is handed on from group to group.
+// A kernel's sections begin at a group's near plane.
 const FIRST_PLANE = 0.0;
-const GROUPS_LOOKED_BACK = 0u;
+
+// Channels share sheets, in which a voxel's footprint is the same.
+fn layers() -> u32 {
+    return 1u;
+}
+
+fn begin_layer(layer: u32) {}
+
+// Nothing is handed on from group to group.
+fn find_handed_on(pixels: Pixels) {}
 
 // Whether groups without voxels are composited too.
 fn counts_gaps() -> bool {
     return COMPOSITING == MINIMUM || COMPOSITING == SURFACE;
+}
+
+// Whether all of them are, even behind the last brick of a patch.
+fn draws_all_groups() -> bool {
+    return COMPOSITING == MINIMUM;
 }
 
 // Whether rays have ends that hide what lies behind.

@@ -1,16 +1,26 @@
 // The tile rasterizer with classification after splatting (SPEC §9): a subgroup gathers values and gradients on the slab planes, and
 // classifies, shades and composites the slabs between two planes at its pixels. Everything else is as in `gather.wgsl`.
 //
-// A group's sheets are the sums on its four far planes. Its near plane is the previous group's last plane, whose field is handed on. A dispatch
-// that continues another one draws the previous group once more, without compositing it, to have that field.
+// A group's sheets are the sums on its four far planes. Its near plane is the previous group's last plane, whose field pixels carry in memory. Each channel
+// (SPEC §10) is a layer with bricks and sums of its own; the sheets of all are added up before they are composited.
 
-@group(0) @binding(15) var<uniform> planes: FieldPlanes;
+// What pixels carry from plane to plane; see `shared/slab`.
+@group(0) @binding(5) var<storage, read_write> carried: array<vec4u>;
+// For every channel.
+@group(0) @binding(15) var<uniform> planes_of: array<FieldPlanes, MOST_LAYERS>;
 // The bits of every voxel's coefficient, a number; read only if `EXACT`.
 @group(0) @binding(16) var coefficients: texture_2d_array<u32>;
+// Those of the voxels' own, if they have any.
+@group(0) @binding(17) var colors: texture_2d_array<u32>;
+
+// The maximum number of channels.
+const MOST_LAYERS = 16u;
+
+// The planes of the layer that is drawn.
+var<private> planes: FieldPlanes;
 
 // The first of a group's planes is one slab behind its near plane.
 const FIRST_PLANE = 1.0;
-const GROUPS_LOOKED_BACK = 1u;
 
 // §8's economies apply only to splatted colours.
 const ECONOMIES = false;
@@ -20,13 +30,41 @@ fn shallow_after(words: vec4u, pixels: Pixels, opacity: vec4f) -> vec4u {
     return words;
 }
 
+fn layers() -> u32 {
+    return CHANNELS;
+}
+
+fn begin_layer(layer: u32) {
+    see_channel(layer);
+    // A constant index spares a gather.
+    if CHANNELS == 1u {
+        planes = planes_of[0];
+    } else {
+        planes = planes_of[layer];
+    }
+}
+
+// Whether the layer is the group's last one, with which its slabs are composited.
+fn is_last_layer() -> bool {
+    return seen_channel.number + 1u == CHANNELS;
+}
+
+// Groups are drawn whose near plane has values.
 fn counts_gaps() -> bool {
+    return halves_handed_on != 0u;
+}
+
+fn draws_all_groups() -> bool {
     return false;
 }
 
-// The previous group may end on a plane whose values hold for the next slab, too.
+// The previous group may end on a plane whose values hold for the next slab, too; and what one layer shows all must add up.
 fn is_due_without_voxels(halves: u32) -> bool {
-    return (halves_handed_on & halves) != 0u;
+    return CHANNELS > 1u || (halves_handed_on & halves) != 0u;
+}
+
+fn draws_front_to_back() -> bool {
+    return true;
 }
 
 // Rays end where they leave the box of voxel centres.
@@ -92,6 +130,9 @@ fn shade_voxels(first: u32) {
         }
         if is_in {
             queue_amounts[slot] = vec4f(gradient, number);
+            if has_own_colors() {
+                queue_colors[slot] = stored_color(planes.colors, index_of(at));
+            }
             let p = placed(at);
             count_drawn(voxel, p, overlapped_sheets(p), false);
         }
@@ -109,7 +150,10 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
         is_added |= seen_count > 0u;
         for (var i = 0u; i < seen_count; i += lanes) {
             let slot = queue_first + base + nth_set_bit(seen, min(i + lane, seen_count - 1u));
-            let own = kernel_at(bitcast<vec4f>(queue_points[slot]), queue_amounts[slot], i + lane < seen_count);
+            var own = kernel_at(bitcast<vec4f>(queue_points[slot]), queue_amounts[slot], i + lane < seen_count);
+            if OWN_COLORS {
+                own.color = queue_colors[select(0u, slot, has_own_colors())];
+            }
             // Every lane adds all voxels at its own pixels, two at a time.
             let count = min(seen_count - i, lanes);
             passes += PASSES_PER_ADDITION + (count + 1u) / 2u;
@@ -140,7 +184,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
     return is_added;
 }
 
-// Composites the slabs in front of the four planes, whose sums are complete.
+// Adds the layer's slabs in front of the four planes, whose sums are complete, to the group's; after the last layer they are composited.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
     passes += passes_per_look() + PASSES_PER_SLABS;
     find_stretches(pixels.column, pixels.rows);
@@ -148,17 +192,19 @@ fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Prog
         load_hits(pixels);
     }
     let image = composite_slabs(load_image(pixels), sheets, pixels);
-    store_image(pixels, image);
-    if FIRST_HIT {
-        store_hits(pixels);
+    for (var is_last = is_last_layer(); is_last; is_last = false) {
+        store_image(pixels, image);
+        if FIRST_HIT {
+            store_hits(pixels);
+        }
+        let opacity = transpose(image)[3];
+        let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
+        (*progress).open = with_blocks((*progress).open, pixels.thread, open_word(pixels, opacity, far));
     }
-    let opacity = transpose(image)[3];
-    let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
-    (*progress).open = with_blocks((*progress).open, pixels.thread, open_word(pixels, opacity, far));
 }
 
 // Passes to load the values of one voxel per lane.
 const PASSES_PER_LOAD = 2u;
 
 // Passes to classify, shade and composite four slabs at four pixels.
-const PASSES_PER_SLABS = 80u;
+const PASSES_PER_SLABS = 200u;

@@ -166,9 +166,8 @@ mod gpu {
     /// Whether a rasterizer draws the scene.
     fn is_drawn_by(rasterizer: Rasterizer, scene: &Scene) -> bool {
         let splatting = &scene.splatting;
-        let is_after = splatting.classification == Classification::After;
         match rasterizer {
-            Rasterizer::Tiles if is_after => !splatting.compositing.is_by_means(),
+            Rasterizer::Tiles if splatting.classification == Classification::After => true,
             Rasterizer::Tiles => splatting.footprint != FootprintForm::Sections,
             _ => true,
         }

@@ -11,14 +11,12 @@ use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Classification, Compositing, Gradient, Order, Projection, Ramp, Rasterizer};
+use sheetsplat::settings::{Classification, Compositing, Gradient, Order, Projection, Ramp};
 use sheetsplat::volume::{Volume, builtin};
 
 use common::compare::{assert_at_most, largest};
 use common::images::largest_difference;
-use common::{
-    BY_AMOUNTS, COMPOSITINGS, DRAWINGS, Drawing, F16, F32, Random, camera, drawn_forms, gpu, scene, transfer,
-};
+use common::{COMPOSITINGS, DRAWINGS, Drawing, F16, F32, Random, camera, drawn_forms, gpu, scene, transfer};
 
 fn render(drawing: Drawing, gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (Image, u64) {
     let rendering = drawing.render(gpu, volume, scene);
@@ -270,7 +268,7 @@ fn every_run_gives_the_same_bytes() {
     }
 }
 
-/// Classified after splatting, too; by tiles where amounts add up.
+/// Classified after splatting, too.
 #[test]
 fn every_run_after_splatting_gives_the_same_bytes() {
     let (volume, mut scene) = head();
@@ -280,9 +278,6 @@ fn every_run_after_splatting_gives_the_same_bytes() {
     let perspective = Projection::Perspective { fov_y: 60.0, distance: None, near: None };
     let projections = [scene.camera.projection, perspective];
     for (compositing, drawing) in COMPOSITINGS.into_iter().flat_map(|of| DRAWINGS.map(|drawing| (of, drawing))) {
-        if drawing == Drawing::By(Rasterizer::Tiles) && !BY_AMOUNTS.contains(&compositing) {
-            continue;
-        }
         for (projection, gradient) in projections.into_iter().zip([Gradient::Differences, Gradient::Kernel]) {
             (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
             scene.shading.gradient = gradient;

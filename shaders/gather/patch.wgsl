@@ -1,7 +1,7 @@
 // A patch of the tile rasterizer, drawn front to back: its bindings, the loop over its groups, and the rounds in which a subgroup visits its
 // pixels. The stage's own file defines what a voxel adds to sheets and how they are composited.
 //
-// Needs gather.wgsl: GROUPS_LOOKED_BACK, add_sections, composite_pixels, counts_gaps, is_due_without_voxels, looks_along_rays.
+// Needs gather.wgsl: add_sections, begin_layer, composite_pixels, counts_gaps, draws_all_groups, find_handed_on, is_due_without_voxels, layers, looks_along_rays.
 // Needs gather/amounts.wgsl: shade_voxels.
 // Needs gather/economies.wgsl: shallow_after.
 // Needs gather/pixels.wgsl: halves_of, load_image, open_word, pixels_of.
@@ -10,21 +10,19 @@
 // Needs gather/ramps.wgsl: Ramp, ramp_of.
 // Needs gather/region.wgsl: PATCH_HEIGHT, PATCH_WIDTH, with_blocks.
 // Needs gather/sheets.wgsl: Sheets, find_stretches, save_sheets, saved_sheets.
-// Needs gather/slabs.wgsl: find_stretches.
+// Needs gather/slabs.wgsl: find_handed_on, find_stretches.
 // Needs gather/uniforms.wgsl: Gather, Gathered, PatchRange.
 // Needs gather/voxels.wgsl: GatheredGroup, find_voxels, keep_voxels, may_appear, search_bounds.
 // Needs gather/walk.wgsl: is_walked, walk.
-// Needs gather_planes.wgsl: GROUPS_LOOKED_BACK, add_sections, composite_pixels, counts_gaps, is_due_without_voxels, looks_along_rays, shade_voxels, shallow_after.
+// Needs gather_planes.wgsl: add_sections, begin_layer, composite_pixels, counts_gaps, draws_all_groups, is_due_without_voxels, layers, looks_along_rays, shade_voxels, shallow_after.
 // Needs shared/brick.wgsl: Brick, Indirect, indirect, unfold.
 // Needs shared/cut.wgsl: Cut, FAR.
-// Needs shared/frame.wgsl: FRONT_TO_BACK, MINIMUM, TILE, frame, start, tile_grid, zero.
+// Needs shared/frame.wgsl: FRONT_TO_BACK, TILE, frame, start, tile_grid, zero.
 @group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
 @group(0) @binding(2) var<uniform> patch_range: PatchRange;
 @group(0) @binding(3) var<storage, read> bricks: array<Brick>;
-// The start in `entries` of every sheet group of every patch.
-@group(0) @binding(4) var<storage, read> starts: array<u32>;
-// Indices of bricks.
-@group(0) @binding(5) var<storage, read> entries: array<u32>;
+// For every layer, patch and sheet group the place of its first brick in this list; behind all of these the indices of bricks.
+@group(0) @binding(4) var<storage, read> bins: array<u32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
 @group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
 @group(0) @binding(7) var values: texture_2d_array<u32>;
@@ -66,8 +64,6 @@ var<private> open: vec4u;
 
 // The group that is being drawn.
 var<private> sheet_group: GatheredGroup;
-// The first group that this dispatch composites; it draws earlier ones again for the field on their last plane.
-var<private> first_composited: u32;
 
 // Counts of passes through loops, bricks visited, and voxels and sections drawn.
 var<private> passes: u32;
@@ -133,6 +129,7 @@ fn find_open_pixels(corner: vec2u, threads: vec2u, thread: u32) -> u32 {
         own_halves |= halves_of(pixels.thread);
         open = with_blocks(open, pixels.thread, open_word(pixels, opacity, -FAR));
         shallow = shallow_after(shallow, pixels, opacity);
+        find_handed_on(pixels);
     }
     return own_halves;
 }
@@ -142,7 +139,7 @@ fn begin_group(at: u32) {
     let number = select(gather.groups - 1u - at, at, ORDER == FRONT_TO_BACK);
     let first_sheet = f32(number * SHEETS);
     let near = gather.near + first_sheet * frame.slab_width;
-    sheet_group = GatheredGroup(number, first_sheet, near, half_boxes[number], at >= first_composited);
+    sheet_group = GatheredGroup(number, first_sheet, near, half_boxes[number]);
 }
 
 // Adds the sections of the queue's voxels to the sheets of all pixels, round by round. After the last voxels of the group (`is_last`) the sheets
@@ -172,11 +169,11 @@ fn draw_queue(corner: vec2u, threads: vec2u, thread: u32, is_last: bool, progres
     }
 }
 
-// Draws the group: finds and shades voxels and adds their sections, once for every filling of the queue.
-fn draw_group(corner: vec2u, threads: vec2u, thread: u32, is_kept: bool) -> GroupOutcome {
+// Draws a layer of the group: finds and shades voxels and adds their sections, once for every filling of the queue.
+fn draw_layer(corner: vec2u, threads: vec2u, thread: u32, is_kept: bool) -> GroupOutcome {
     let search = search_bounds(is_kept);
     var progress = Progress(open, shallow, 0u);
-    var outcome = GroupOutcome(true, COMPOSITING == MINIMUM);
+    var outcome = GroupOutcome(true, draws_all_groups());
     var first_new = queue_count;
     loop {
         passes += PASSES_PER_FILL;
@@ -226,6 +223,42 @@ fn finish(at: u32, reached: u32) {
     }
 }
 
+// Draws a group's layers, given by its patch and its place in compositing order.
+fn draw_group(corner: vec2u, threads: vec2u, thread: u32, place: vec2u, is_kept: bool) -> GroupOutcome {
+    var all = GroupOutcome(true, false);
+    for (var layer = 0u; layer < layers(); layer += 1u) {
+        begin_layer(layer);
+        // The queue holds voxels of one layer.
+        let is_kept_here = is_kept && layers() == 1u;
+        if !is_kept_here {
+            queue_count = 0u;
+        }
+        keep_voxels();
+        let bin = bin_of(layer, place.x) + place.y;
+        walk(bins[bin], bins[bin + 1u]);
+        let outcome = draw_layer(corner, threads, thread, is_kept_here);
+        all = GroupOutcome(all.is_whole && outcome.is_whole, all.has_drawn || outcome.has_drawn);
+    }
+    return all;
+}
+
+// The first bin of a layer of a patch.
+fn bin_of(layer: u32, patch_number: u32) -> u32 {
+    let side = vec2u(PATCH_WIDTH, PATCH_HEIGHT);
+    let patches = (frame.size + side - 1u) / side;
+    return (layer * patches.x * patches.y + patch_number) * gather.groups;
+}
+
+// The number of bricks that some groups of a patch visit, in all layers.
+fn brick_count(patch_number: u32, first: u32, end: u32) -> u32 {
+    var count = 0u;
+    for (var layer = 0u; layer < layers(); layer += 1u) {
+        let bin = bin_of(layer, patch_number);
+        count += bins[bin + end] - bins[bin + first];
+    }
+    return count;
+}
+
 // Draws a patch's groups in compositing order, from where the previous dispatch stopped, until all pixels are opaque.
 fn draw(number: u32, first_thread: u32, thread: u32) {
     hold_ramps();
@@ -236,36 +269,25 @@ fn draw(number: u32, first_thread: u32, thread: u32) {
     let threads = vec2u(first_thread, first_thread + PATCH_THREADS / WORKGROUPS_PER_PATCH);
     let own_halves = find_open_pixels(corner, threads, thread);
 
-    let first_bin = number * gather.groups;
     let reached = gather.reached + number * HALVES + firstTrailingBit(own_halves);
     var at = atomicLoad(&gathered.words[reached]);
-    // Earlier groups are drawn again for the field that they hand on.
-    first_composited = at;
-    at -= min(at, GROUPS_LOOKED_BACK);
-    var end = starts[first_bin + at];
     // Whether the queue holds all voxels of the previous group.
     var is_kept = false;
     for (; at < gather.groups && any(open != vec4u(0u)); at += 1u) {
-        let first_entry = end;
-        end = starts[first_bin + at + 1u];
+        let count = brick_count(number, at, at + 1u);
         // A driver may end long loops, so work that would need too many passes is left to the next dispatch.
-        if passes + gather.passes_per_group + (end - first_entry) * gather.passes_per_brick > gather.most_passes {
+        if passes + gather.passes_per_group + count * gather.passes_per_brick > gather.most_passes {
             break;
         }
-        passes += PASSES_PER_GROUP;
-        if first_entry == end && !counts_gaps() {
+        passes += PASSES_PER_GROUP + 4u * (layers() - 1u);
+        if count == 0u && !counts_gaps() {
             is_kept = false;
             continue;
         }
         begin_group(at);
-        if !is_kept {
-            queue_count = 0u;
-        }
-        keep_voxels();
-        walk(first_entry, end);
-        let outcome = draw_group(corner, threads, thread, is_kept);
+        let outcome = draw_group(corner, threads, thread, vec2u(number, at), is_kept);
         is_kept = outcome.is_whole && !may_appear();
-        for (var has_drawn = outcome.has_drawn && sheet_group.is_composited; has_drawn; has_drawn = false) {
+        for (var has_drawn = outcome.has_drawn; has_drawn; has_drawn = false) {
             if lane == 0u {
                 count_composited(at, corner);
             }
@@ -291,12 +313,11 @@ fn main(
     let first_thread = at_workgroup % WORKGROUPS_PER_PATCH * (PATCH_THREADS / WORKGROUPS_PER_PATCH);
     var is_left = false;
     if number < patch_range.end_patch {
-        let first_bin = number * gather.groups;
         let half = firstTrailingBit(halves_of(first_thread + thread));
         let at = atomicLoad(&gathered.words[gather.reached + number * HALVES + half]);
-        // For `minimum`, empty groups count too, even behind the last brick of the patch.
-        let first = select(at, 0u, COMPOSITING == MINIMUM && at < gather.groups);
-        is_left = starts[first_bin + first] < starts[first_bin + gather.groups];
+        // Some modes count empty groups too, even behind the last brick of the patch.
+        let first = select(at, 0u, draws_all_groups() && at < gather.groups);
+        is_left = brick_count(number, first, gather.groups) > 0u;
     }
     for (; is_left; is_left = false) {
         draw(number, first_thread, thread);

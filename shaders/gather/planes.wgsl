@@ -5,6 +5,7 @@
 // Needs gather_planes.wgsl: planes.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/planes.wgsl: MIN_WEIGHT.
+// Needs shared/seen.wgsl: OWN_COLORS.
 
 // Whether gradients are the field's derivative instead of the voxels' differences.
 override KERNEL_GRADIENT: bool = false;
@@ -22,6 +23,11 @@ struct PlaneSums {
     offset_x: vec4f,
     offset_y: vec4f,
     offset_z: vec4f,
+    // For colours of voxels' own Σ colour·g.
+    red: vec4f,
+    green: vec4f,
+    blue: vec4f,
+    alpha: vec4f,
 }
 
 // The sums on the far planes of a group's four slabs.
@@ -32,7 +38,8 @@ struct Sheets {
     fourth: PlaneSums,
 }
 
-// The number of a pixel's sums on a plane, 8 with the kernel's gradient; and of the sums on all planes at all of a patch's threads.
+// The number of a pixel's sums on a plane, 8 with the kernel's gradient, and 4 more with colours; and of the sums on all planes at all of a patch's
+// threads.
 override SUMS: u32 = 5u;
 override SAVED: u32 = 640u;
 
@@ -58,6 +65,13 @@ fn save_plane(thread: u32, plane: u32, sums: PlaneSums) {
         saved[first + 6u * PATCH_THREADS] = sums.offset_y;
         saved[first + 7u * PATCH_THREADS] = sums.offset_z;
     }
+    if OWN_COLORS {
+        let colors_first = first + (SUMS - 4u) * PATCH_THREADS;
+        saved[colors_first] = sums.red;
+        saved[colors_first + PATCH_THREADS] = sums.green;
+        saved[colors_first + 2u * PATCH_THREADS] = sums.blue;
+        saved[colors_first + 3u * PATCH_THREADS] = sums.alpha;
+    }
 }
 
 fn saved_sheets(thread: u32) -> Sheets {
@@ -77,6 +91,13 @@ fn saved_plane(thread: u32, plane: u32) -> PlaneSums {
         sums.offset_y = saved[first + 6u * PATCH_THREADS];
         sums.offset_z = saved[first + 7u * PATCH_THREADS];
     }
+    if OWN_COLORS {
+        let colors_first = first + (SUMS - 4u) * PATCH_THREADS;
+        sums.red = saved[colors_first];
+        sums.green = saved[colors_first + PATCH_THREADS];
+        sums.blue = saved[colors_first + 2u * PATCH_THREADS];
+        sums.alpha = saved[colors_first + 3u * PATCH_THREADS];
+    }
     return sums;
 }
 
@@ -91,6 +112,8 @@ struct PlaneKernel {
     distances: vec4f,
     weights: vec4f,
     cuts: vec4f,
+    // The colour and A of the voxel's own.
+    color: vec4f,
 }
 
 // The group's four far planes.
@@ -113,9 +136,9 @@ fn kernel_at(point: vec4f, amount: vec4f, is_there: bool) -> PlaneKernel {
         let per_depth = 1.0 / far_planes_from_eye();
         let x = (point.x + distances * planes.step.x) * per_depth + middle.x;
         let y = (point.y + distances * planes.step.y) * per_depth + middle.y;
-        return PlaneKernel(x, y, amount, distances, weights, cuts);
+        return PlaneKernel(x, y, amount, distances, weights, cuts, vec4f());
     }
-    return PlaneKernel(vec4f(point.x + middle.x), vec4f(point.y + middle.y), amount, distances, weights, cuts);
+    return PlaneKernel(vec4f(point.x + middle.x), vec4f(point.y + middle.y), amount, distances, weights, cuts, vec4f());
 }
 
 // The kernel of another lane.
@@ -133,6 +156,9 @@ fn kernel_of(own: PlaneKernel, other: u32) -> PlaneKernel {
     }
     if KERNEL_GRADIENT {
         kernel.distances = subgroupShuffle(own.distances, other);
+    }
+    if OWN_COLORS {
+        kernel.color = subgroupShuffle(own.color, other);
     }
     return kernel;
 }
@@ -181,6 +207,12 @@ fn with_voxel(sums: PlaneSums, kernel: PlaneKernel, at: InPlane, plane: u32) -> 
         result.y += weight * kernel.amount.y;
         result.z += weight * kernel.amount.z;
     }
+    if OWN_COLORS {
+        result.red += weight * kernel.color.x;
+        result.green += weight * kernel.color.y;
+        result.blue += weight * kernel.color.z;
+        result.alpha += weight * kernel.color.w;
+    }
     return result;
 }
 
@@ -216,27 +248,18 @@ fn fields_of(sums: PlaneSums) -> Fields {
     return Fields(has_value, number, along * x, along * y, along * z);
 }
 
-// The field on the previous group's last plane.
-var<workgroup> handed_on: array<vec4f, 5u * PATCH_THREADS>;
-
-// A mask of the halves of blocks in which the plane that was handed on has values.
-var<private> halves_handed_on: u32;
-
-fn hand_on(thread: u32, fields: Fields) {
-    handed_on[thread] = select(vec4f(0.0), vec4f(1.0), fields.has_value);
-    handed_on[PATCH_THREADS + thread] = fields.number;
-    handed_on[2u * PATCH_THREADS + thread] = fields.x;
-    handed_on[3u * PATCH_THREADS + thread] = fields.y;
-    handed_on[4u * PATCH_THREADS + thread] = fields.z;
-}
-
-fn fields_handed_on(thread: u32, is_any: bool) -> Fields {
-    let has_value = (handed_on[thread] != vec4f(0.0)) & vec4<bool>(is_any);
-    return Fields(
-        has_value,
-        select(vec4f(0.0), handed_on[PATCH_THREADS + thread], has_value),
-        select(vec4f(0.0), handed_on[2u * PATCH_THREADS + thread], has_value),
-        select(vec4f(0.0), handed_on[3u * PATCH_THREADS + thread], has_value),
-        select(vec4f(0.0), handed_on[4u * PATCH_THREADS + thread], has_value),
+// The colours and A on a plane at a thread's four pixels: red, green, blue and A columns.
+fn colors_of(sums: PlaneSums, has_value: vec4<bool>) -> mat4x4f {
+    if !OWN_COLORS {
+        return mat4x4f();
+    }
+    let per_weight = select(vec4f(0.0), 1.0 / select(vec4f(1.0), sums.weight, has_value), has_value);
+    let none = vec4f(0.0);
+    let one = vec4f(1.0);
+    return mat4x4f(
+        clamp(sums.red * per_weight, none, one),
+        clamp(sums.green * per_weight, none, one),
+        clamp(sums.blue * per_weight, none, one),
+        clamp(sums.alpha * per_weight, none, one),
     );
 }

@@ -10,6 +10,9 @@ override QUEUE: u32 = 96u;
 // Each voxel's screen coordinates from `project` as bits, with its brick and slot in place of the depth from the eye; and its amount (C·m, m).
 var<workgroup> queue_points: array<vec4u, QUEUE>;
 var<workgroup> queue_amounts: array<vec4f, QUEUE>;
+// The colours of voxels' own, if they count.
+override QUEUE_COLORS: u32 = 1u;
+var<workgroup> queue_colors: array<vec4f, QUEUE_COLORS>;
 // A mask of the blocks to whose pixels the voxel is drawn; see also `WHOLE_SHIFT`.
 var<workgroup> queue_blocks: array<u32, QUEUE>;
 

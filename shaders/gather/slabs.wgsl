@@ -1,20 +1,22 @@
 // The slabs between planes at a thread's pixels: classified, shaded and composited (SPEC §9).
 //
-// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PERSPECTIVE, SHEETS, control_points, cut, sheet_group.
+// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PATCH_THREADS, PERSPECTIVE, SHEETS, acc, control_points, cut, gather, passes, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
-// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, fields_handed_on, fields_of, halves_handed_on, hand_on.
-// Needs gather_planes.wgsl: planes.
+// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, colors_of, fields_of.
+// Needs gather_planes.wgsl: carried, is_last_layer.
 // Needs shared/cells.wgsl: nearest_voxel, voxel_at.
-// Needs shared/compositing.wgsl: composite.
-// Needs shared/cut.wgsl: is_drawn_slab, noted, place_of, sheet_depths, shown_depths.
-// Needs shared/frame.wgsl: FRONT_TO_BACK, frame.
-// Needs shared/means.wgsl: both, in_box.
+// Needs shared/channels.wgsl: CHANNELS.
+// Needs shared/cut.wgsl: FAR, place_of, sheet_depths, shown_depths.
+// Needs shared/frame.wgsl: AVERAGE, SURFACE, frame.
+// Needs shared/means.wgsl: both, in_box, is_by_means.
+// Needs shared/planes.wgsl: NO_NUMBER.
 // Needs shared/project.wgsl: slope_of.
-// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
-// Needs shared/shading.wgsl: lighting, shade.
-// Needs shared/slab_integral.wgsl: slab_integral.
+// Needs shared/ramps.wgsl: LABELS.
+// Needs shared/seen.wgsl: OWN_COLORS, ramps_at, seen_channel.
+// Needs shared/shading.wgsl: lighting.
+// Needs shared/slab.wgsl: Composited, NOTHING_CARRIED, NO_SAMPLE, Slab, carried_by, carried_color, carried_sample, carry, carry_color, choose, composite_sheet, find_surface, is_drawn, part_of, sheet_of, slab_between, with_sample.
 // Needs shared/texels.wgsl: index_of.
-// Needs shared/volume.wgsl: HOLES, gradient_of, is_hole, stored_at.
+// Needs shared/volume.wgsl: HOLES, is_hole, stored_at.
 
 // For a thread's four pixels: the sheet depths between which their rays count, the length of a ray per sheet depth, and the depths of first
 // hits, as bits.
@@ -40,59 +42,52 @@ fn find_stretches(column: f32, rows: vec4f) {
     }
 }
 
-// The field at one pixel.
-struct PixelField {
-    has_value: bool,
-    number: f32,
-    gradient: vec3f,
+// A mask of the halves of blocks in which the plane that was handed on has values of some layer.
+var<private> halves_handed_on: u32;
+
+// The sheets of a group's slabs at all of a patch's pixels, added up over layers.
+override LAYER_SHEETS: u32 = 1u;
+var<workgroup> layer_sheets: array<vec4f, LAYER_SHEETS>;
+
+fn sample_of(fields: Fields, i: u32) -> vec4f {
+    let sample = vec4f(fields.number[i], fields.x[i], fields.y[i], fields.z[i]);
+    return select(NO_SAMPLE, sample, fields.has_value[i]);
 }
 
-fn sample_of(fields: Fields, i: u32) -> PixelField {
-    return PixelField(fields.has_value[i], fields.number[i], vec3f(fields.x[i], fields.y[i], fields.z[i]));
-}
-
-// A slab at one pixel: if only one plane has a value, it holds for both.
-struct Slab {
-    near: PixelField,
-    far: PixelField,
-    has_value: bool,
-}
-
-fn slab_between(near: PixelField, far: PixelField) -> Slab {
-    var slab = Slab(near, far, near.has_value || far.has_value);
-    if !near.has_value {
-        slab.near = far;
-    }
-    if !far.has_value {
-        slab.far = near;
-    }
-    return slab;
-}
-
-// Whether a slab's range of values reaches values that have an opacity.
+// Whether the values in a slab reach some that have an opacity; for `surface` of one half.
 fn has_opacity(slab: Slab, ramps: vec4u) -> bool {
     let head = control_points[ramps.w];
-    return slab.has_value && max(slab.near.number, slab.far.number) >= head.z && min(slab.near.number, slab.far.number) <= head.w;
+    return max(slab.first.x, slab.last.x) >= head.z && min(slab.first.x, slab.last.x) <= head.w;
 }
 
-// The sheet of a slab of which the ray shows a length.
-fn sheet_of(slab: Slab, ramps: vec4u, length: f32, point_px: vec2f) -> vec4f {
-    let means = slab_integral(ramps.w, slab.near.number, slab.far.number);
-    let gradient = gradient_of(0.5 * planes.per_number * mix(slab.near.gradient, slab.far.gradient, means.share));
-    var m = means.amount;
-    for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
-        m *= ramp(ramps.z, ramps.w, gradient.magnitude).x;
-    }
-    let a = m * length;
-    return vec4f(a * shade(means.color, gradient, lighting(point_px, PERSPECTIVE)), a);
+// The place of a thread's `i`-th pixel among the records that pixels carry. A pixel off the image has that of the last one, and carries nothing.
+fn carried_slot(pixels: Pixels, i: u32) -> u32 {
+    return min(pixels.slot + i * frame.size.x, carried_pixels() - 1u);
 }
 
-// The ramps of the voxel whose cell holds a pixel's point at a sheet depth.
-fn ramps_at(point_px: vec2f, sheet_depth: f32) -> vec4u {
-    if !LABELS {
-        return vec4u(0u, frame.ramps.xyz);
+// The number of pixels that carry something: those of the band.
+fn carried_pixels() -> u32 {
+    return arrayLength(&acc);
+}
+
+// Finds in which halves of blocks the plane that an earlier dispatch handed on has values.
+fn find_handed_on(pixels: Pixels) {
+    passes += 6u * CHANNELS + 1u;
+    var is_any = false;
+    for (var layer = 0u; layer < CHANNELS; layer += 1u) {
+        for (var i = 0u; i < 4u; i += 1u) {
+            let held = carried[layer * carried_pixels() + carried_slot(pixels, i)] ^ NOTHING_CARRIED;
+            is_any = is_any || (pixels.is_inside[i] && bitcast<f32>(held.x) != NO_NUMBER);
+        }
     }
-    return ramps_of(0u, index_of(nearest_voxel(voxel_at(place_of(point_px), sheet_depth))));
+    note_handed_on(pixels, is_any, true);
+}
+
+// Notes whether a thread's pixels have values on the plane that is handed on, in place of the noted ones or beside those of other layers.
+fn note_handed_on(pixels: Pixels, is_any: bool, is_first: bool) {
+    let half = 1u << pixels.thread / 4u;
+    let noted = select(halves_handed_on, halves_handed_on & ~subgroupOr(half), is_first);
+    halves_handed_on = noted | subgroupOr(select(0u, half, is_any));
 }
 
 // Removes a plane's values where the nearest voxel is a hole.
@@ -120,6 +115,12 @@ fn sums_on(sheets: Sheets, j: u32) -> PlaneSums {
         sums.offset_y = one_of(sheets.first.offset_y, sheets.second.offset_y, sheets.third.offset_y, sheets.fourth.offset_y, j);
         sums.offset_z = one_of(sheets.first.offset_z, sheets.second.offset_z, sheets.third.offset_z, sheets.fourth.offset_z, j);
     }
+    if OWN_COLORS {
+        sums.red = one_of(sheets.first.red, sheets.second.red, sheets.third.red, sheets.fourth.red, j);
+        sums.green = one_of(sheets.first.green, sheets.second.green, sheets.third.green, sheets.fourth.green, j);
+        sums.blue = one_of(sheets.first.blue, sheets.second.blue, sheets.third.blue, sheets.fourth.blue, j);
+        sums.alpha = one_of(sheets.first.alpha, sheets.second.alpha, sheets.third.alpha, sheets.fourth.alpha, j);
+    }
     return sums;
 }
 
@@ -128,38 +129,146 @@ fn one_of(first: vec4f, second: vec4f, third: vec4f, fourth: vec4f, j: u32) -> v
     return select(select(first, second, is_odd), select(third, fourth, is_odd), vec4<bool>(j >= 2u));
 }
 
-// Composites a group's slabs at four pixels. The near plane's field comes from the previous group, and the last plane's goes to the next.
+// Four numbers at each of a thread's pixels, number by number. Loops over pixels read them by component: drivers unroll loops that index arrays.
+struct Records {
+    x: vec4u,
+    y: vec4u,
+    z: vec4u,
+    w: vec4u,
+}
+
+const PIXELS = vec4u(0u, 1u, 2u, 3u);
+
+fn record_at(of_pixels: Records, i: u32) -> vec4u {
+    return vec4u(of_pixels.x[i], of_pixels.y[i], of_pixels.z[i], of_pixels.w[i]);
+}
+
+fn with_record(of_pixels: Records, i: u32, record: vec4u) -> Records {
+    let here = PIXELS == vec4u(i);
+    return Records(
+        select(of_pixels.x, vec4u(record.x), here),
+        select(of_pixels.y, vec4u(record.y), here),
+        select(of_pixels.z, vec4u(record.z), here),
+        select(of_pixels.w, vec4u(record.w), here),
+    );
+}
+
+fn color_of_pixel(columns: mat4x4f, i: u32) -> vec4f {
+    return vec4f(columns[0][i], columns[1][i], columns[2][i], columns[3][i]);
+}
+
+fn with_color(columns: mat4x4f, i: u32, color: vec4f) -> mat4x4f {
+    let here = PIXELS == vec4u(i);
+    return mat4x4f(
+        select(columns[0], vec4f(color.x), here),
+        select(columns[1], vec4f(color.y), here),
+        select(columns[2], vec4f(color.z), here),
+        select(columns[3], vec4f(color.w), here),
+    );
+}
+
+// Composites a layer's slabs at four pixels, or adds them to those of other layers. The near plane's field comes from the previous group, and the last
+// plane's goes to the next.
 fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
-    var result = image;
-    var near = fields_handed_on(pixels.thread, (halves_handed_on >> pixels.thread / 4u & 1u) != 0u);
+    var result = transpose(image);
+    var held: Records;
+    var held_colors: mat4x4f;
+    for (var i = 0u; i < 4u; i += 1u) {
+        held = with_record(held, i, carried_by(carried_slot(pixels, i), carried_pixels()));
+        held_colors = with_color(held_colors, i, carried_color(carried_slot(pixels, i), carried_pixels()));
+    }
+    var is_handed_on = false;
     for (var j = 0u; j < SHEETS; j += 1u) {
-        let depth = sheet_group.near + f32(j) * frame.slab_width;
-        let far = without_holes(fields_of(sums_on(sheets, j)), pixels, depth + frame.slab_width);
-        let from_depth = max(vec4f(depth), shown_from);
-        let to_depth = min(vec4f(depth + frame.slab_width), shown_to);
-        let is_seen = (from_depth < to_depth) & (near.has_value | far.has_value) & vec4<bool>(sheet_group.is_composited)
-            & vec4<bool>(!CUT || is_drawn_slab(depth + 0.5 * frame.slab_width));
-        let lengths = max(to_depth - from_depth, vec4f(0.0)) * length_per_depth;
+        let near = sheet_group.near + f32(j) * frame.slab_width;
+        let far = near + frame.slab_width;
+        let sums = sums_on(sheets, j);
+        let fields = without_holes(fields_of(sums), pixels, far);
+        let plane_colors = colors_of(sums, fields.has_value);
         for (var i = 0u; i < 4u; i += 1u) {
-            let slab = slab_between(sample_of(near, i), sample_of(far, i));
-            let point_px = vec2f(pixels.column, pixels.rows[i]);
-            let ramps = ramps_at(point_px, 0.5 * (from_depth[i] + to_depth[i]));
-            for (var is_shown = is_seen[i] && has_opacity(slab, ramps); is_shown; is_shown = false) {
-                let before = result[i];
-                let after = composite(before, sheet_of(slab, ramps, lengths[i], point_px), COMPOSITING, FRONT_TO_BACK);
-                result[i] = after;
-                if FIRST_HIT {
-                    let is_hit = before.a < cut.first_hit && after.a >= cut.first_hit;
-                    let share = (cut.first_hit - before.a) / (after.a - before.a);
-                    hits[i] = select(hits[i], noted(mix(from_depth[i], to_depth[i], share)), is_hit);
+            let before = record_at(held, i);
+            let color_before = color_of_pixel(held_colors, i);
+            var now = Composited(color_of_pixel(result, i), before, vec4f(), FAR, false);
+            let drawn = sample_of(fields, i);
+            let drawn_color = color_of_pixel(plane_colors, i);
+            // The sum of an average's colours stays where a plane has no number.
+            now.carried_color = select(drawn_color, color_before, COMPOSITING == AVERAGE && before.z != 0u);
+            let place = place_in_slab(pixels, i, near, far);
+            let slab = slab_between(place, drawn, carried_sample(before), drawn_color, color_before);
+            let part = part_of(slab.ray, near, far);
+            let is_shown = min(drawn.x, carried_sample(before).x) != NO_NUMBER && may_show(slab, part, now.image);
+            passes += select(0u, gather.search_passes, subgroupAny(is_shown));
+            var sheet = vec4f(0.0);
+            for (var is_left = is_shown; is_left; is_left = false) {
+                let light = lighting(vec2f(pixels.column, pixels.rows[i]), PERSPECTIVE);
+                if is_chosen_from() {
+                    now = choose(slab, now.image, before, color_before, light);
+                } else if COMPOSITING == SURFACE {
+                    let found = find_surface(slab, now.image, light);
+                    now = Composited(found.image, now.carried, now.carried_color, found.hit, found.is_changed);
+                } else {
+                    sheet = sheet_of(slab, light);
                 }
             }
+            if !is_by_means() {
+                let added = composite_layer(sheet, part, now.image, (j * 4u + i) * PATCH_THREADS + pixels.thread);
+                now = Composited(added.image, now.carried, now.carried_color, added.hit, added.is_changed);
+            }
+            result = with_color(result, i, now.image);
+            if FIRST_HIT && now.is_changed && (is_by_means() || now.hit != FAR) {
+                let hit = select(noted(now.hit), 0u, now.hit == FAR);
+                hits = select(hits, vec4u(hit), PIXELS == vec4u(i));
+            }
+            held = with_record(held, i, with_sample(now.carried, drawn));
+            held_colors = with_color(held_colors, i, now.carried_color);
         }
-        near = far;
+        is_handed_on = any(fields.has_value & pixels.is_inside);
     }
-    hand_on(pixels.thread, near);
-    let half = 1u << pixels.thread / 4u;
-    let has_values = subgroupOr(select(0u, half, any(near.has_value)));
-    halves_handed_on = (halves_handed_on & ~subgroupOr(half)) | has_values;
-    return result;
+    for (var i = 0u; i < 4u; i += 1u) {
+        if pixels.is_inside[i] {
+            carry(carried_slot(pixels, i), carried_pixels(), record_at(held, i));
+            carry_color(carried_slot(pixels, i), carried_pixels(), color_of_pixel(held_colors, i));
+        }
+    }
+    note_handed_on(pixels, is_handed_on, seen_channel.number == 0u);
+    return transpose(result);
+}
+
+// The ray of a thread's `i`-th pixel in a slab.
+fn place_in_slab(pixels: Pixels, i: u32, near: f32, far: f32) -> Slab {
+    let at = place_of(vec2f(pixels.column, pixels.rows[i]));
+    let none = vec4f(0.0);
+    let ray = vec2f(shown_from[i], shown_to[i]);
+    return Slab(at, near, far, far, ray, length_per_depth[i], none, none, none, none, none);
+}
+
+// Whether a slab may change a pixel of some colour.
+fn may_show(slab: Slab, part: vec2f, image: vec4f) -> bool {
+    // Every point counts among the numbers that are chosen.
+    if is_chosen_from() {
+        return true;
+    }
+    let is_open = frame.culling == 0u || image.a < frame.opacity_threshold;
+    let is_seen = part.x < part.y && is_drawn(slab.near + 0.5 * frame.slab_width);
+    // Labels' tables differ from cell to cell.
+    let is_among = has_opacity(slab, ramps_at(slab.at, 0.5 * (part.x + part.y))) || (LABELS && COMPOSITING == SURFACE);
+    return is_open && is_seen && is_among;
+}
+
+// Whether a pixel's colour is that of a number chosen from all points.
+fn is_chosen_from() -> bool {
+    return is_by_means() && COMPOSITING != SURFACE;
+}
+
+// Adds a layer's sheet to those of the layers before it, and composites the sum of all.
+fn composite_layer(sheet: vec4f, part: vec2f, image: vec4f, place: u32) -> Composited {
+    var sum = sheet;
+    if CHANNELS > 1u {
+        sum += select(layer_sheets[place], vec4f(0.0), seen_channel.number == 0u);
+        layer_sheets[place] = sum;
+    }
+    var composited = Composited(image, vec4u(), vec4f(), FAR, false);
+    for (var is_due = is_last_layer() && sum.a > 0.0; is_due; is_due = false) {
+        composited = composite_sheet(sum, part, image);
+    }
+    return composited;
 }

@@ -11,14 +11,12 @@
 // Needs gather_planes.wgsl: ECONOMIES, FIRST_PLANE, overlapped_sheets, placed, screen_box, sections_here.
 // Needs shared/frame.wgsl: BOX_SLACK, FRONT_TO_BACK, frame.
 
-// A group of sheets: its number, its first sheet, the depth where that begins, half the box around its footprints, and whether this dispatch
-// composites it.
+// A group of sheets: its number, its first sheet, the depth where that begins, and half the box around its footprints.
 struct GatheredGroup {
     number: u32,
     first_sheet: f32,
     near: f32,
     half_box: vec2f,
-    is_composited: bool,
 }
 
 // The part of that range in the sheet group.

@@ -3,7 +3,7 @@
 //
 // Needs gather/amounts.wgsl: is_searched_in_perspective.
 // Needs gather/bits.wgsl: ballot, nth_set_bit, together.
-// Needs gather/patch.wgsl: PERSPECTIVE, bricks, bricks_visited, entries, lane, lanes, passes.
+// Needs gather/patch.wgsl: PERSPECTIVE, bins, bricks, bricks_visited, lane, lanes, passes.
 // Needs gather_planes.wgsl: is_searched_in_perspective.
 // Needs shared/brick.wgsl: BRICK_VOXELS, in_brick.
 // Needs shared/frame.wgsl: frame.
@@ -57,7 +57,7 @@ fn is_walked() -> bool {
 // Fetches one brick per lane.
 fn fetch_bricks(search: SearchBounds) {
     passes += 1u;
-    walk_state.fetched = entries[min(walk_state.next + lane, walk_state.end - 1u)];
+    walk_state.fetched = bins[min(walk_state.next + lane, walk_state.end - 1u)];
     let record = bricks[walk_state.fetched];
     walk_state.fetched_corner = vec3u(record.x, record.y, record.z) & vec3u(~3u);
     walk_state.fetched_present = record.present;

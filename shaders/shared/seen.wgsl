@@ -56,7 +56,12 @@ fn gradient_between(near: vec4f, far: vec4f, share: f32) -> Gradient {
 
 // The opacity of a gradient.
 fn gradient_opacity(ramps: vec4u, gradient: Gradient) -> f32 {
-    return ramp(ramps.z, ramps.w, gradient.magnitude).x;
+    // Without gradient opacity the ramp is a single point. (A loop is left out where no thread needs it.)
+    var opacity = control_points[ramps.z].y;
+    for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
+        opacity = ramp(ramps.z, ramps.w, gradient.magnitude).x;
+    }
+    return opacity;
 }
 
 // The shaded means over the values between two samples, each a number and its gradient, from the nearer to the farther one. `own` is the colour of the

@@ -37,6 +37,8 @@ pub struct Ramps {
     pub first_channel: u32,
     /// The maximum number of control points in each ramp.
     lengths: [u32; 3],
+    /// The maximum number of cells in a table of integrals.
+    cells: u32,
 }
 
 /// Where labels and colours of a channel are stored among those of all channels of a volume.
@@ -82,14 +84,16 @@ impl Ramps {
         let is_alone = stored.len() == 1;
         let only_shades = is_alone && integration.is_none();
         let matter = |tables: &LabelTables| if only_shades { tables.matter_to_shading() } else { tables.matter() };
-        let mut points = Vec::new();
+        let (mut points, mut cells) = (Vec::new(), 0);
         let (mut mains, mut all, mut labelled) = (Vec::new(), Vec::new(), Vec::new());
         for (number, (transfer, stored)) in transfer.channels().zip(stored).enumerate() {
             let mut append = |points: &mut Vec<[f32; 4]>, label| {
                 let tables = transfer.tables(label);
                 let bounds = append(points, &tables, is_alone);
                 if let Some(Integration { compositing, numbers, .. }) = integration {
-                    points.extend(slab_integral::table(&tables, compositing, &numbers[number]));
+                    let table = slab_integral::table(&tables, compositing, &numbers[number]);
+                    cells = cells.max(table[0][0] as u32);
+                    points.extend(table);
                 }
                 all.push(bounds);
                 bounds
@@ -123,12 +127,17 @@ impl Ramps {
         }
         let lengths = [0, 1, 2].map(|ramp| all.iter().map(|ends| ends[ramp + 1] - ends[ramp]).max().unwrap_or(0));
         let [_, ends @ ..] = mains[0];
-        Self { points, ends, channel_table, channels: mains.len() as u32, first_channel, lengths }
+        Self { points, ends, channel_table, channels: mains.len() as u32, first_channel, lengths, cells }
     }
 
     /// The maximum number of control points in each ramp, over all labels and channels.
     pub fn lengths(&self) -> [u32; 3] {
         self.lengths
+    }
+
+    /// The maximum number of cells in a table of integrals, over all labels and channels; 0 without such tables.
+    pub fn cells(&self) -> u32 {
+        self.cells
     }
 }
 

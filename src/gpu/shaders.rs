@@ -218,7 +218,8 @@ pub const CLASSIFY: Shader = shader!(
     "shared/field_voxel",
     "shared/cells",
     "shared/seen",
-    "shared/first_surface"
+    "shared/first_surface",
+    "shared/slab"
 );
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "shared/frame", "shared/brick", "shared/tile_list");
@@ -272,16 +273,22 @@ pub const GATHER_PLANES: Shader = shader!(
     "gather/ramps",
     "shared/texels",
     "shared/volume",
+    "shared/channels",
+    "shared/colors",
     "shared/project",
     "shared/shading",
     "shared/ramps",
     "shared/compositing",
     "shared/cut",
     "shared/means",
+    "shared/field_voxel",
     "shared/cells",
     "shared/planes",
     "shared/number",
     "shared/slab_integral",
+    "shared/seen",
+    "shared/first_surface",
+    "shared/slab",
     "gather/slabs"
 );
 /// Adds up the images of channels that share no sheets.

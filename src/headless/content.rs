@@ -4,14 +4,13 @@ use wgpu::{Device, Queue};
 
 use super::readback;
 use crate::error::RenderError;
-use crate::lists::quad_plan::{TILE, tile_grid};
 use crate::part::{Content, Extreme};
-use crate::rasterizer::fields::ChosenNumbers;
+use crate::rasterizer::carried::Carried;
 use crate::renderer::prepared_frame::{Drawing, PreparedFrame};
 use crate::settings::splatting::Compositing;
 use crate::settings::window::Region;
 
-/// The number of a pixel that has chosen none.
+/// The number of a pixel that has chosen none. Records of pixels hold the bits in which a number differs from it.
 const NO_NUMBER: f32 = 1e30;
 
 /// The compositing buffer's pixels in a region of a frame that was submitted. If the compositing has them choose values (SPEC §9), `chosen`, also
@@ -31,10 +30,8 @@ pub(super) fn content(
         let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, buffer)?);
         crop(&pixels, (frame, band.band.first_row), region, &mut colors);
     }
-    let extremes = match frame.first_drawing() {
-        Some(Drawing::Fields(fields)) if chosen.is_some() => {
-            extremes((device, queue), frame, fields.chosen(), region, &colors)?
-        }
+    let extremes = match frame.first_drawing().and_then(Drawing::carried) {
+        Some(carried) if chosen.is_some() => extremes((device, queue), frame, carried, region, &colors)?,
         _ => Vec::new(),
     };
     if chosen == Some(Compositing::Minimum) {
@@ -53,36 +50,27 @@ fn crop<T: Copy>(pixels: &[T], (frame, first_row): (&PreparedFrame, u32), region
     }
 }
 
-/// The values that the pixels of a region chose, by what they carry and their colours.
+/// The values that the pixels of a region chose in a volume of one channel, by what they carry and their colours.
 fn extremes(
     (device, queue): (&Device, &Queue),
     frame: &PreparedFrame,
-    ChosenNumbers { carried, last_groups, range: [low, high] }: ChosenNumbers<'_>,
+    Carried { bands, range: [low, high] }: &Carried,
     region: &Region,
     colors: &[[f32; 4]],
 ) -> Result<Vec<Extreme>, RenderError> {
-    let groups: Vec<u32> = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, last_groups)?);
     let mut held = Vec::with_capacity(region.pixels());
-    for (band, buffer) in frame.compositing.bands.iter().zip(carried) {
+    for (band, buffer) in frame.compositing.bands.iter().zip(bands) {
         let bytes = readback::buffer(device, queue, buffer)?;
         // The buffer may be larger than the band.
         let size = band.band.rows as usize * frame.compositing.size[0] as usize;
-        let words: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[..size * size_of::<[f32; 4]>()]);
+        let words: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&bytes[..size * size_of::<[f32; 4]>()]);
         crop(&words, (frame, band.band.first_row), region, &mut held);
     }
-    let tiles = tile_grid(frame.compositing.size)[0] as usize;
     let span = if high > low { high - low } else { 1.0 };
-    let places = region.rows().flat_map(|y| region.columns().map(move |x| (x, y)));
-    let extreme = |(x, y): (usize, usize), [.., number]: [f32; 4], color: &[f32; 4]| {
-        if groups[y / TILE as usize * tiles + x / TILE as usize] == 0 {
-            return Extreme::default();
-        }
-        match number {
-            NO_NUMBER if color[3] == 0.0 => Extreme::default(),
-            NO_NUMBER => Extreme { value: 0.0, counted: Extreme::MIDDLE },
-            number => Extreme { value: (number - low) / span, counted: Extreme::POINT },
-        }
+    let extreme = |([.., bits], color): ([u32; 4], &[f32; 4])| match f32::from_bits(bits ^ NO_NUMBER.to_bits()) {
+        NO_NUMBER if color[3] == 0.0 => Extreme::default(),
+        NO_NUMBER => Extreme { value: 0.0, counted: Extreme::MIDDLE },
+        number => Extreme { value: (number - low) / span, counted: Extreme::POINT },
     };
-    let pixels = places.zip(held).zip(colors);
-    Ok(pixels.map(|((place, held), color)| extreme(place, held, color)).collect())
+    Ok(held.into_iter().zip(colors).map(extreme).collect())
 }

@@ -47,6 +47,12 @@ const MAX_PASSES_OF_BRICK: u32 = 158;
 /// The same where values are gathered (SPEC §9): loading them takes 16 instead of shading's 56.
 const MAX_PASSES_OF_BRICK_OF_VALUES: u32 = MAX_PASSES_OF_BRICK - 40;
 
+/// The number of passes that classify and composite four slabs of a block.
+const MAX_PASSES_OF_SLABS: u32 = 200;
+
+/// The number of these slabs at the pixels of a thread.
+const SLABS_OF_THREAD: u32 = 4 * SHEETS;
+
 /// The number of passes that add a brick's voxels to a block.
 const MAX_PASSES_OF_ADDITION: u32 = 56;
 
@@ -65,23 +71,35 @@ pub struct Passes {
     pub per_group: u32,
     /// The passes of a brick.
     pub per_brick: u32,
-    /// The passes to look up a voxel's control points in memory.
+    /// The passes to look up a voxel's control points in memory; where values are gathered, to find a surface in a slab.
     pub search: u32,
 }
 
+/// What decides the passes of a view.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Work {
+    /// [`Passes::search`].
+    pub search: u32,
+    /// The number of threads in the smallest subgroups.
+    pub threads: u32,
+}
+
 impl Passes {
-    /// The passes of a view in which a workgroup draws `blocks` blocks of a patch with subgroups of `threads` threads or more, and looking up a
-    /// voxel's control points in memory takes at most `search` passes; where `values` are gathered nothing is looked up.
-    pub fn new(search: u32, blocks: u32, threads: u32, values: bool) -> Self {
-        let per_group = MAX_PASSES_OF_GROUP + blocks * (MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
-        let of_voxels = match values {
-            true => MAX_PASSES_OF_BRICK_OF_VALUES,
-            false => MAX_PASSES_OF_BRICK + SHADED_PER_BRICK * search,
+    /// The passes of a view in which a workgroup draws `blocks` blocks of a patch in a number of layers; `values` states whether values are gathered.
+    pub fn new(Work { search, threads }: Work, blocks: u32, layers: u32, values: bool) -> Self {
+        let (of_voxels, of_slabs) = match values {
+            true => (
+                MAX_PASSES_OF_BRICK_OF_VALUES,
+                MAX_PASSES_OF_SLABS.saturating_add(SLABS_OF_THREAD.saturating_mul(search)),
+            ),
+            false => (MAX_PASSES_OF_BRICK + SHADED_PER_BRICK * search, 0),
         };
+        let of_block = of_slabs.saturating_add(MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
+        let per_group = layers.saturating_mul(blocks.saturating_mul(of_block).saturating_add(MAX_PASSES_OF_GROUP));
         let per_brick = of_voxels + blocks * MAX_PASSES_OF_ADDITION;
         // Half as many threads take twice as many passes.
         let times = 8_u32.div_ceil(threads);
-        Self { most: MAX_PASSES, per_group: times * per_group, per_brick: times * per_brick, search }
+        Self { most: MAX_PASSES, per_group: per_group.saturating_mul(times), per_brick: times * per_brick, search }
     }
 }
 
@@ -94,10 +112,11 @@ pub struct PatchBins {
     pub patches: u32,
     /// The number of sheet groups of every patch.
     pub groups: u32,
-    /// The start in `entries` of every patch's groups, in compositing order, patch after patch; finally the end.
-    pub starts: Vec<u32>,
-    /// Indices of bricks.
-    pub entries: Vec<u32>,
+    /// The start of every bin in this list: for every layer and every patch its groups, in compositing order; then the end of the last one, which is that of
+    /// the list. The bins themselves follow, indices of bricks.
+    pub words: Vec<u32>,
+    /// The number of bins.
+    pub bins: u32,
     /// For every group, nearest first, half the screen box in pixels around its footprints.
     pub half_boxes: Vec<DVec2>,
     /// The number of workgroups per patch: one, or one per block if too much lies behind some patch.
@@ -141,40 +160,45 @@ struct Pixels {
 }
 
 impl PatchBins {
-    /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`. With `planes` (SPEC §9) it is a brick's
-    /// planes that count, and its footprints on them. The sheet depths `covered` belong to some group even if they are empty; groups without any
-    /// of the slabs `drawn` are left out. Looking up a
-    /// voxel's control points in memory takes at most `search` passes through loops, and subgroups have `threads` threads or more. Neither list may
-    /// have more than `most_words` words.
+    /// Sorts the bricks of some layers by the patches and groups they may touch, with kernels of the radius `support`; layers' bricks are numbered one layer
+    /// after the other. With `planes` (SPEC §9) it is a brick's planes that count, and its footprints on them. The sheet depths `covered` belong to some
+    /// group even if they are empty; groups without any of the slabs `drawn` are left out. The list may have `most_words` words.
     ///
     /// # Errors
     /// If there are more bricks in total, or behind a patch, than the rasterizer supports.
     pub fn new(
-        bricks: &[Brick],
+        layers: &[&[Brick]],
         (view, planes): (&ViewGeometry, Option<&PlaneGeometry>),
         order: Order,
         (covered, drawn): (Range<f64>, &Range<i32>),
         support: f64,
-        (search, threads): (u32, u32),
+        work: Work,
         most_words: u64,
     ) -> Result<Self, TileCapacityError> {
         let check = |what, required: u64, actual: u64| {
             if required <= actual { Ok(()) } else { Err(TileCapacityError { what, required, actual }) }
         };
-        check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
+        let bricks: usize = layers.iter().map(|bricks| bricks.len()).sum();
+        check("bricks", bricks as u64, MAX_BRICKS as u64)?;
         let drawn = if drawn.is_empty() { 0..0 } else { SlabGrid::groups_of(drawn, SHEETS) };
         let within = |groups: Range<i32>| groups.start.max(drawn.start)..groups.end.min(drawn.end);
-        let mut placed = place(bricks, view, planes);
-        placed.iter_mut().for_each(|brick| brick.groups = within(brick.groups.clone()));
-        placed.retain(|brick| !brick.groups.is_empty());
+        let mut first_number = 0;
+        let place = |bricks: &&[Brick]| {
+            let mut placed = place(bricks, first_number, view, planes);
+            first_number += bricks.len() as u32;
+            placed.iter_mut().for_each(|brick| brick.groups = within(brick.groups.clone()));
+            placed.retain(|brick| !brick.groups.is_empty());
+            placed
+        };
+        let placed: Vec<Vec<Placed>> = layers.iter().map(place).collect();
         let group_planes = view.slabs.groups(SHEETS);
         let covered = group_planes.covered(covered).map(within).filter(|groups| !groups.is_empty());
-        let all = || placed.iter().map(|brick| &brick.groups).chain(&covered);
+        let all = || placed.iter().flatten().map(|brick| &brick.groups).chain(&covered);
         let first_group = all().map(|groups| groups.start).min().unwrap_or(0);
         let end_group = all().map(|groups| groups.end).max().unwrap_or(0);
         let groups = (end_group - first_group) as u32;
         let [columns, rows] = grid(view.size);
-        let bins = u64::from(columns) * u64::from(rows) * u64::from(groups);
+        let bins = u64::from(columns) * u64::from(rows) * u64::from(groups) * layers.len() as u64;
         check("patches times sheet groups", bins, most_words - 1)?;
 
         let half_boxes: Vec<DVec2> = (first_group..end_group)
@@ -188,24 +212,29 @@ impl PatchBins {
             })
             .collect();
 
-        let sort = Sort { placed: &placed, half_boxes: &half_boxes, order, first_group, size: view.size };
         let strip_rows = rows.div_ceil(STRIPS_PER_THREAD * parallel::current_num_threads() as u32).max(1);
-        let strips = (0..rows).into_par_iter().step_by(strip_rows as usize);
-        let strips: Vec<_> = strips.map(|first| sort.counted(first..(first + strip_rows).min(rows))).collect();
-        let total = strips.iter().map(|strip| strip.entries).sum();
-        check("bricks in patches and sheet groups", total, most_words)?;
-        let mut starts = Vec::with_capacity(bins as usize + 1);
-        let mut next = 0;
-        for count in strips.iter().flat_map(|strip| &strip.counts) {
-            starts.push(next);
+        let sort = |placed| Sort { placed, half_boxes: &half_boxes, order, first_group, size: view.size };
+        let strips = placed.iter().flat_map(|placed: &Vec<Placed>| {
+            let of_rows = move |first: u32| (sort(placed), first..(first + strip_rows).min(rows));
+            (0..rows).step_by(strip_rows as usize).map(of_rows)
+        });
+        let strips: Vec<_> = strips.collect();
+        let strips: Vec<_> = strips.into_par_iter().map(|(sort, rows)| (sort.counted(rows), sort)).collect();
+        let total: u64 = strips.iter().map(|(strip, _)| strip.entries).sum();
+        check("bricks in patches and sheet groups", total, most_words - 1 - bins)?;
+        let mut words = Vec::with_capacity((bins + 1 + total) as usize);
+        let mut next = bins as u32 + 1;
+        for count in strips.iter().flat_map(|(strip, _)| &strip.counts) {
+            words.push(next);
             next += count;
         }
-        starts.push(next);
-        let entries: Vec<_> = strips.par_iter().map(|strip| sort.sorted(strip)).collect();
-        let entries = entries.concat();
+        words.push(next);
+        let entries: Vec<_> = strips.par_iter().map(|(strip, sort)| sort.sorted(strip)).collect();
+        entries.into_iter().for_each(|entries| words.extend(entries));
+        let starts = &words[..=bins as usize];
         let of_workgroups = |workgroups| {
-            let passes = Passes::new(search, BLOCKS / workgroups, threads, planes.is_some());
-            let dispatches = dispatches(&starts, groups as usize, &passes, planes.is_some());
+            let passes = Passes::new(work, BLOCKS / workgroups, layers.len() as u32, planes.is_some());
+            let dispatches = dispatches(starts, [layers.len(), groups as usize], &passes);
             dispatches.map(|dispatches| (workgroups, passes, dispatches))
         };
         let (workgroups, passes, dispatches) = of_workgroups(1).or_else(|_| of_workgroups(BLOCKS))?;
@@ -213,13 +242,18 @@ impl PatchBins {
             first_slab: first_group * SHEETS as i32,
             patches: columns * rows,
             groups,
-            starts,
-            entries,
+            words,
+            bins: bins as u32,
             half_boxes,
             workgroups,
             passes,
             dispatches,
         })
+    }
+
+    /// The start of every bin in [`Self::words`], and the end of the last one.
+    pub fn starts(&self) -> &[u32] {
+        &self.words[..=self.bins as usize]
     }
 }
 
@@ -314,8 +348,8 @@ impl Placed {
     }
 }
 
-/// The bricks in front of the eye, in memory order, so that equal scenes add up in equal order after any history of changes.
-fn place(bricks: &[Brick], view: &ViewGeometry, planes: Option<&PlaneGeometry>) -> Vec<Placed> {
+/// The bricks in front of the eye, numbered from some number on, in memory order, so that equal scenes add up in equal order after any history of changes.
+fn place(bricks: &[Brick], first: u32, view: &ViewGeometry, planes: Option<&PlaneGeometry>) -> Vec<Placed> {
     let groups = view.slabs.groups(SHEETS);
     let mut placed: Vec<Placed> = (bricks.par_iter().enumerate())
         .filter(|(_, brick)| brick.present != [0; 2])
@@ -327,14 +361,14 @@ fn place(bricks: &[Brick], view: &ViewGeometry, planes: Option<&PlaneGeometry>) 
             };
             let is_beyond_near = bounds.depths.start < bounds.depths.end;
             is_beyond_near.then(|| Placed {
-                number: number as u32,
+                number: first + number as u32,
                 low: bounds.low,
                 high: bounds.high,
                 groups: groups.touched(bounds.depths.start, bounds.depths.end),
             })
         })
         .collect();
-    let position = |placed: &Placed| brick::position(&bricks[placed.number as usize]);
+    let position = |placed: &Placed| brick::position(&bricks[(placed.number - first) as usize]);
     if !placed.is_sorted_by_key(position) {
         placed.par_sort_unstable_by_key(position);
     }
@@ -346,35 +380,28 @@ pub fn grid(size: [u32; 2]) -> [u32; 2] {
     [size[0].div_ceil(PATCH[0]), size[1].div_ceil(PATCH[1])]
 }
 
-/// A number of dispatches that suffices for every patch: each processes groups until the next one might exceed the passes. If it `looks_back`, one that
-/// continues another processes the group before its first once more.
-fn dispatches(starts: &[u32], groups: usize, passes: &Passes, looks_back: bool) -> Result<u32, TileCapacityError> {
-    let of_group = |bricks: u32| u64::from(passes.per_group) + u64::from(bricks) * u64::from(passes.per_brick);
+/// A number of dispatches that suffices for every patch, given the numbers of layers and of groups: each processes groups until the next one might exceed
+/// the passes.
+fn dispatches(starts: &[u32], [layers, groups]: [usize; 2], passes: &Passes) -> Result<u32, TileCapacityError> {
     let most = u64::from(passes.most);
-    let of_patch = |first: usize| {
-        let (mut dispatches, mut taken, mut before) = (1, 0, 0);
-        for group in starts[first..=first + groups].windows(2) {
-            let bricks = group[1] - group[0];
-            let needed = of_group(bricks);
+    let patches = (starts.len() - 1) / (layers * groups.max(1));
+    let of_patch = |patch: usize| {
+        let (mut dispatches, mut taken) = (1, 0);
+        for group in 0..groups {
+            let bin = |layer: usize| (layer * patches + patch) * groups + group;
+            let bricks: u32 = (0..layers).map(|layer| starts[bin(layer) + 1] - starts[bin(layer)]).sum();
+            let needed = u64::from(passes.per_group) + u64::from(bricks) * u64::from(passes.per_brick);
             if taken + needed > most && taken > 0 {
-                dispatches += 1;
-                taken = if looks_back { of_group(before) } else { 0 };
+                (dispatches, taken) = (dispatches + 1, 0);
             }
             taken += needed;
             if taken > most {
-                let what = match looks_back {
-                    true => "bricks behind a patch in two neighbouring sheet groups",
-                    false => "bricks behind a patch in one sheet group",
-                };
-                let groups_at_once = 1 + u32::from(looks_back);
-                let actual = passes.most.saturating_sub(groups_at_once * passes.per_group) / passes.per_brick;
-                let required = if looks_back { bricks + before } else { bricks };
-                return Err(TileCapacityError { what, required: required.into(), actual: actual.into() });
+                let what = "bricks behind a patch in one sheet group";
+                let actual = passes.most.saturating_sub(passes.per_group) / passes.per_brick;
+                return Err(TileCapacityError { what, required: bricks.into(), actual: actual.into() });
             }
-            before = bricks;
         }
         Ok(dispatches)
     };
-    let patches = (0..starts.len() - 1).into_par_iter().step_by(groups.max(1));
-    patches.map(of_patch).try_reduce(|| 0, |a, b| Ok(a.max(b)))
+    (0..patches).into_par_iter().map(of_patch).try_reduce(|| 0, |a, b| Ok(a.max(b)))
 }

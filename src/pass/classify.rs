@@ -59,7 +59,7 @@ pub struct ClassifyGroup {
     stage: Arc<ComputeStage>,
 }
 
-/// Bytes that a pixel carries from plane to plane for each channel, and for its colours.
+/// Bytes of a record that a pixel carries from plane to plane: one for each channel, and one for each with colours of voxels' own.
 pub const CARRIED_BYTES: u64 = 16;
 
 impl Classify {

@@ -9,7 +9,6 @@ use wgpu::{
 };
 
 use super::composite::{CutBuffers, RayMode};
-use super::values::PlaneBuffers;
 use crate::gpu::bindings::{
     ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture_of_integers, uniform,
 };
@@ -53,6 +52,9 @@ pub fn drawn_order(splatting: &Splatting) -> Order {
     if splatting.classification == Classification::After { Order::FrontToBack } else { splatting.order }
 }
 
+/// The maximum number of channels that are gathered on slab planes, each a layer of every group.
+pub const MOST_LAYERS: usize = 16;
+
 /// What is gathered on slab planes (SPEC §9).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PlaneMode {
@@ -60,6 +62,10 @@ pub struct PlaneMode {
     pub gradient: Gradient,
     /// Whether coefficients differ from the values.
     pub exact: bool,
+    /// The number of layers, one for each channel that shares sheets (SPEC §10).
+    pub layers: u32,
+    /// Whether voxels of any channel have colours of their own.
+    pub own_colors: bool,
 }
 
 impl GatherMode {
@@ -101,6 +107,15 @@ impl GatherMode {
     }
 }
 
+/// The buffers for gathering values on planes.
+#[derive(Clone, Copy, Debug)]
+pub struct GatheredPlanes<'a> {
+    /// [`FieldPlanes`] of every channel, as many as [`MOST_LAYERS`].
+    pub planes: &'a Buffer,
+    /// The bits of all coefficients if they differ from the values.
+    pub coefficients: Option<&'a TextureView>,
+}
+
 /// The stage's buffers.
 #[derive(Clone, Copy, Debug)]
 pub struct GatherBuffers<'a> {
@@ -109,15 +124,13 @@ pub struct GatherBuffers<'a> {
     /// One [`GatherUniform`].
     pub gather: &'a Buffer,
     /// The planes, if values are gathered on them (SPEC §9).
-    pub planes: Option<PlaneBuffers<'a>>,
+    pub planes: Option<GatheredPlanes<'a>>,
     /// One [`PatchRange`] at every dynamic offset.
     pub patch_ranges: &'a Buffer,
     /// `[Brick]`.
     pub bricks: &'a Buffer,
-    /// [`PatchBins::starts`](crate::lists::patch_bins::PatchBins::starts).
-    pub starts: &'a Buffer,
-    /// [`PatchBins::entries`](crate::lists::patch_bins::PatchBins::entries).
-    pub entries: &'a Buffer,
+    /// [`PatchBins::words`](crate::lists::patch_bins::PatchBins::words).
+    pub bins: &'a Buffer,
     /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// The volume's values.
@@ -140,20 +153,21 @@ impl Gather {
         Arc::clone(stages.entry(mode).or_insert_with(|| Arc::new(compile(device, mode))))
     }
 
-    /// Binds a band of the compositing buffer, `[vec4f]`, for one mode and a number of dispatches.
+    /// Binds a band of the compositing buffer, `[vec4f]`, and what its pixels carry from plane to plane, if values are gathered on planes, for one mode and
+    /// a number of dispatches.
     pub fn bind(
         &self,
         device: &Device,
         mode: GatherMode,
         buffers: GatherBuffers<'_>,
-        acc: &Buffer,
+        band: (&Buffer, Option<&Buffer>),
         dispatches: u32,
     ) -> GatherBand {
         let usage = BufferUsages::STORAGE | BufferUsages::INDIRECT | BufferUsages::COPY_DST;
         let descriptor = buffer_spec("sheetsplat.next", NEXT_BYTES, usage);
         let next: Vec<Buffer> = (0..dispatches).map(|_| device.create_buffer(&descriptor)).collect();
         let stage = self.compiled(device, mode);
-        let groups = next.iter().map(|next| self.bind_one(device, &stage, buffers, acc, next)).collect();
+        let groups = next.iter().map(|next| self.bind_one(device, &stage, buffers, band, next)).collect();
         GatherBand { stage, groups, next, workgroups_per_patch: workgroups_per_patch(device, mode) }
     }
 
@@ -162,12 +176,10 @@ impl Gather {
         device: &Device,
         stage: &ComputeStage,
         buffers: GatherBuffers<'_>,
-        acc: &Buffer,
+        (acc, carried): (&Buffer, Option<&Buffer>),
         next: &Buffer,
     ) -> BindGroup {
-        let GatherBuffers {
-            frame, gather, patch_ranges, bricks, starts, entries, control_points, values, labels, ..
-        } = buffers;
+        let GatherBuffers { frame, gather, patch_ranges, bricks, bins, control_points, values, labels, .. } = buffers;
         let labels = labels.unwrap_or_else(|| &self.no_labels.get_or_init(|| VolumeTexture::no_labels(device)).view);
         let whole = Buffer::as_entire_binding;
         let mut resources = vec![
@@ -175,8 +187,7 @@ impl Gather {
             ("gathers", whole(gather)),
             ("patch_range", at_offset::<PatchRange>(patch_ranges)),
             ("bricks", whole(bricks)),
-            ("starts", whole(starts)),
-            ("entries", whole(entries)),
+            ("bins", whole(bins)),
             ("control_points", whole(control_points)),
             ("values", wgpu::BindingResource::TextureView(values)),
             ("acc", whole(acc)),
@@ -187,15 +198,14 @@ impl Gather {
             ("cut", whole(buffers.cut.uniform)),
             ("surfaces", wgpu::BindingResource::TextureView(buffers.cut.surfaces)),
         ];
-        if buffers.planes.is_none() {
-            let none = || &self.no_colors.get_or_init(|| VolumeTexture::no_colors(device)).view;
-            let colors = buffers.colors.map_or_else(none, |own| own.view);
-            resources.push(("colors", wgpu::BindingResource::TextureView(colors)));
-        }
-        if let Some(PlaneBuffers { planes, coefficients }) = buffers.planes {
-            resources.push(("planes", whole(planes)));
+        let none = || &self.no_colors.get_or_init(|| VolumeTexture::no_colors(device)).view;
+        let colors = buffers.colors.map_or_else(none, |own| own.view);
+        resources.push(("colors", wgpu::BindingResource::TextureView(colors)));
+        if let Some(GatheredPlanes { planes, coefficients }) = buffers.planes {
+            resources.push(("planes_of", whole(planes)));
             resources.push(("coefficients", wgpu::BindingResource::TextureView(coefficients.unwrap_or(values))));
         }
+        resources.extend(carried.map(|carried| ("carried", whole(carried))));
         stage.bind(device, &resources)
     }
 
@@ -216,8 +226,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("gathers", uniform::<GatherUniform>(stage, false)),
         ("patch_range", uniform::<PatchRange>(stage, true)),
         ("bricks", storage::<Brick>(stage, true)),
-        ("starts", storage::<u32>(stage, true)),
-        ("entries", storage::<u32>(stage, true)),
+        ("bins", storage::<u32>(stage, true)),
         ("control_points", storage::<[f32; 4]>(stage, true)),
         ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("acc", storage::<[f32; 4]>(stage, false)),
@@ -227,12 +236,12 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("next", storage::<Indirect>(stage, false)),
         ("cut", uniform::<Cut>(stage, false)),
         ("surfaces", depth_texture(stage)),
+        ("colors", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
-    if mode.planes.is_none() {
-        slots.push(("colors", texture_of_integers(stage, TextureViewDimension::D2Array)));
-    } else {
-        slots.push(("planes", uniform::<FieldPlanes>(stage, false)));
+    if mode.planes.is_some() {
+        slots.push(("planes_of", uniform::<[FieldPlanes; MOST_LAYERS]>(stage, false)));
         slots.push(("coefficients", texture_of_integers(stage, TextureViewDimension::D2Array)));
+        slots.push(("carried", storage::<[u32; 4]>(stage, false)));
     }
     let mut constants = vec![
         ("THREADS", f64::from(threads(device))),
@@ -244,26 +253,27 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
         ("LABELS", f64::from(u8::from(mode.labels))),
         ("HOLES", f64::from(u8::from(mode.holes))),
+        ("CHANNELS", f64::from(mode.channels)),
+        ("FULL_COLOR", f64::from(mode.full_color)),
         ("CUT", f64::from(u8::from(mode.rays.cut))),
         ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
     ];
     let flag = |is_set| f64::from(u8::from(is_set));
     let shader = match mode.planes {
-        Some(PlaneMode { gradient, exact }) => {
+        Some(planes) => {
             constants.extend([
-                ("KERNEL_GRADIENT", flag(gradient == Gradient::Kernel)),
-                ("EXACT", flag(exact)),
-                ("SUMS", f64::from(sums(gradient))),
-                ("SAVED", f64::from(sums(gradient) * SHEETS * PATCH[0] * PATCH[1] / 4)),
+                ("KERNEL_GRADIENT", flag(planes.gradient == Gradient::Kernel)),
+                ("EXACT", flag(planes.exact)),
+                ("OWN_COLORS", flag(planes.own_colors)),
+                ("SUMS", f64::from(planes.sums())),
+                ("SAVED", f64::from(planes.sums() * SHEETS * PATCH_THREADS)),
+                ("LAYER_SHEETS", f64::from(planes.layer_sheets())),
+                ("QUEUE_COLORS", f64::from(if planes.own_colors { queue(device, mode) } else { 1 })),
             ]);
             shaders::GATHER_PLANES
         }
         None => {
-            constants.extend([
-                ("ECONOMIES", flag(mode.economies)),
-                ("CHANNELS", f64::from(mode.channels)),
-                ("FULL_COLOR", f64::from(mode.full_color)),
-            ]);
+            constants.extend([("ECONOMIES", flag(mode.economies)), ("QUEUE_COLORS", 1.0)]);
             shaders::GATHER
         }
     };
@@ -286,26 +296,39 @@ fn threads(device: &Device) -> u32 {
     device.adapter_info().subgroup_max_size.min(PATCH_THREADS)
 }
 
-/// The number of sums of a pixel on a slab plane (SPEC §9).
-fn sums(gradient: Gradient) -> u32 {
-    match gradient {
-        Gradient::Differences => 5,
-        Gradient::Kernel => 8,
+impl PlaneMode {
+    /// The number of sums of a pixel on a slab plane (SPEC §9).
+    fn sums(&self) -> u32 {
+        let of_values = match self.gradient {
+            Gradient::Differences => 5,
+            Gradient::Kernel => 8,
+        };
+        of_values + if self.own_colors { 4 } else { 0 }
+    }
+
+    /// The number of colours of a sheet at a thread's pixels that layers are added up in, if there are several.
+    fn layer_sheets(&self) -> u32 {
+        if self.layers > 1 { 4 * SHEETS * PATCH_THREADS } else { 1 }
     }
 }
 
-/// The workgroup memory in bytes of a patch's pixels: four sheets of a colour, or the sums on four planes and the field that is handed on from one.
+/// The workgroup memory in bytes of a patch's pixels: four sheets of a colour; or the sums on four planes, and the sheets of all layers.
 fn pixel_bytes(planes: Option<PlaneMode>) -> u32 {
-    let floats = planes.map_or(4 * SHEETS, |planes| sums(planes.gradient) * SHEETS + 5);
-    PATCH[0] * PATCH[1] * floats * size_of::<f32>() as u32
+    let (sums, others) = planes.map_or((4, 0), |planes| (planes.sums(), planes.layer_sheets()));
+    (sums * SHEETS * PATCH_THREADS + others) * size_of::<[f32; 4]>() as u32
 }
 
-/// The bytes of a voxel in the queue: point, amount and blocks.
-const VOXEL_BYTES: u32 = 36;
+/// The bytes of a voxel in the queue: point, amount and blocks, and a colour of its own.
+fn voxel_bytes(planes: Option<PlaneMode>) -> u32 {
+    if planes.is_some_and(|planes| planes.own_colors) { 52 } else { 36 }
+}
+
+/// The bytes of a list of colours that a mode does not need.
+const NO_COLORS_BYTES: u32 = 16;
 
 /// The minimum workgroup memory in bytes: that of the pixels, and of a queue of two voxels for each thread of the largest subgroup.
 pub fn min_workgroup_bytes(planes: Option<PlaneMode>) -> u32 {
-    pixel_bytes(planes) + 64 * VOXEL_BYTES
+    NO_COLORS_BYTES + pixel_bytes(planes) + 64 * voxel_bytes(planes)
 }
 
 /// The number of voxels in a workgroup's queue, which has the memory that the patch's pixels leave. On a GPU more than [`WORKGROUP_BYTES`] would
@@ -313,9 +336,10 @@ pub fn min_workgroup_bytes(planes: Option<PlaneMode>) -> u32 {
 fn queue(device: &Device, mode: GatherMode) -> u32 {
     let bytes = match device.adapter_info().device_type {
         DeviceType::Cpu => device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES),
-        _ => WORKGROUP_BYTES.max(min_workgroup_bytes(mode.planes)),
+        _ => WORKGROUP_BYTES,
     };
-    (bytes - pixel_bytes(mode.planes)) / VOXEL_BYTES / 32 * 32
+    let bytes = bytes.max(min_workgroup_bytes(mode.planes));
+    (bytes - NO_COLORS_BYTES - pixel_bytes(mode.planes)) / voxel_bytes(mode.planes) / 32 * 32
 }
 
 /// The size in bytes of the arguments that a dispatch leaves for the next.

@@ -7,10 +7,11 @@ use std::sync::OnceLock;
 
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, Device, Limits, TextureFormat, TextureView};
 
+use super::carried::Carried;
 use super::sheet_groups::{GroupSettings, SheetGroups, group_stride};
 use super::{FrameEstimate, FrameInputs, Prepared, compute};
 use crate::error::RenderError;
-use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes};
+use crate::gpu::bindings::{content_spec, sizes};
 use crate::gpu::counts::GroupSlabs;
 use crate::gpu::layout::{Brick, FieldPlanes};
 use crate::gpu::ramps::Stored;
@@ -19,7 +20,7 @@ use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::lists::brick;
 use crate::lists::quad_plan::FramePlan;
-use crate::pass::classify::{CARRIED_BYTES, Classify, ClassifyBuffers, ClassifyGroup, ClassifyMode};
+use crate::pass::classify::{Classify, ClassifyBuffers, ClassifyGroup, ClassifyMode};
 use crate::pass::composite::CompositeMode;
 use crate::pass::cull::{Cull, CullList};
 use crate::pass::field::{self, Field};
@@ -49,8 +50,6 @@ pub(crate) struct FieldRasterizer {
 pub(crate) struct FieldFrame {
     groups: SheetGroups,
     order: Order,
-    /// The minimum and maximum number of the first channel's coefficients.
-    range: [f32; 2],
     channels: Vec<PreparedChannel>,
     /// The lists of all channels, one channel after the other.
     lists: Vec<PreparedList>,
@@ -58,21 +57,9 @@ pub(crate) struct FieldFrame {
     clear_group: BindGroup,
     /// For colours, if there are any.
     clear_color: Option<BindGroup>,
-    /// For every band what its pixels carry from plane to plane.
-    carried: Vec<Buffer>,
+    carried: Carried,
     classify_groups: Vec<ClassifyGroup>,
     occlude_groups: [BindGroup; 2],
-}
-
-/// Where the numbers are that pixels have chosen.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ChosenNumbers<'a> {
-    /// For every band what its pixels carry: the last of four words is the number, or 1e30 where no plane has a point. There is one channel.
-    pub(crate) carried: &'a [Buffer],
-    /// One word per tile, 0 where nothing is carried.
-    pub(crate) last_groups: &'a Buffer,
-    /// The minimum and maximum number of the coefficients.
-    pub(crate) range: [f32; 2],
 }
 
 /// A channel, which has sums of its own.
@@ -122,8 +109,8 @@ impl FieldRasterizer {
         let FrameInputs { device, request, frame, .. } = inputs;
         let (view, splatting) = (&after.view, &request.splatting);
         let (old_groups, old_channels, old_carried, old_lists) = match previous {
-            Some(FieldFrame { groups, channels, carried, lists, .. }) => (Some(groups), channels, carried, lists),
-            None => (None, Vec::new(), Vec::new(), Vec::new()),
+            Some(FieldFrame { groups, channels, carried, lists, .. }) => (Some(groups), channels, Some(carried), lists),
+            None => (None, Vec::new(), None, Vec::new()),
         };
         let covered = &covered(inputs.bricks(), after);
         let (format, layers) = (self.sheet_format, layers(request));
@@ -132,21 +119,17 @@ impl FieldRasterizer {
         let (groups, bucketed) = SheetGroups::prepare(inputs, settings, &self.tiles, group_bytes, old_groups)?;
         let channels = Self::prepare_channels(inputs, after, &groups, old_channels)?;
         let lists = self.prepare_lists(inputs, after, (&groups, &channels), old_lists)?;
-        let mut old_carried = old_carried.into_iter();
-        let carried = (inputs.compositing.bands.iter())
-            .map(|band| grown(device, old_carried.next(), &carried(request, band.band.rows)))
-            .collect::<Result<Vec<Buffer>, RenderError>>()?;
+        let carried = Carried::prepare(inputs, after.numbers[0].range, old_carried)?;
         self.field.prepare(device, after.gradient);
         let SheetGroups { targets, tile_lists, .. } = &groups;
         let colors = self.colors.get().filter(|_| request.colored() > 0);
         let frame = FieldFrame {
             clear_group: self.field.bind_clear(device, frame, &tile_lists.composited),
             clear_color: colors.map(|colors| colors.bind_clear(device, frame, &tile_lists.composited)),
-            classify_groups: self.bind_bands(inputs, after, (&groups, &channels), &carried),
+            classify_groups: self.bind_bands(inputs, after, (&groups, &channels), &carried.bands),
             occlude_groups: self.occlude.bind(device, [frame, &groups.groups], &tile_lists.occluding, targets),
             gradient: after.gradient,
             order: splatting.order,
-            range: after.numbers[0].range,
             groups,
             channels,
             lists,
@@ -264,7 +247,7 @@ impl FieldRasterizer {
         let mut buffers = SheetGroups::buffer_specs(request, &plan, &group_bytes, lists);
         let planes = || content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM);
         buffers.extend(request.stored.iter().map(|_| planes()));
-        buffers.extend(request.bands.iter().map(|band| carried(request, band.rows)));
+        buffers.extend(Carried::specs(request));
         let targets = Targets::estimate(limits, size, sheet_format, layers(request))?;
         Ok(FrameEstimate {
             bytes: sizes(limits, &buffers)? + targets,
@@ -277,6 +260,7 @@ impl FieldRasterizer {
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &FieldFrame) {
         let tile_lists = &frame.groups.tile_lists;
         frame.groups.clear(encoder, frame.lists.iter().map(|list| &list.cull));
+        frame.carried.clear(encoder);
         for (lists, any_offset) in frame.groups.with_lists(&frame.lists) {
             let mut pass = encoder.begin_compute_pass(&compute("sheetsplat.cull", timer, "cull"));
             for &(list, offset) in &lists {
@@ -335,17 +319,16 @@ impl FieldFrame {
         (&self.groups.hits, 0)
     }
 
-    /// The numbers that pixels choose with `maximum` and `minimum`.
-    pub(crate) fn chosen(&self) -> ChosenNumbers<'_> {
-        let last_groups = &self.groups.targets.last_groups;
-        ChosenNumbers { carried: &self.carried, last_groups, range: self.range }
+    /// What pixels carry from plane to plane.
+    pub(crate) fn carried(&self) -> &Carried {
+        &self.carried
     }
 
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         let lists: u64 = self.lists.iter().map(|list| list.cull.gpu_bytes()).sum();
         let planes = self.channels.iter().map(|channel| &channel.planes);
-        self.groups.gpu_bytes() + lists + self.carried.iter().chain(planes).map(Buffer::size).sum::<u64>()
+        self.groups.gpu_bytes() + lists + self.carried.gpu_bytes() + planes.map(Buffer::size).sum::<u64>()
     }
 }
 
@@ -358,12 +341,6 @@ fn drawn(request: &FrameRequest) -> Range<i32> {
 /// The layers of sheets that hold a plane's sums.
 fn layers(request: &FrameRequest) -> u32 {
     request.stored.len() as u32 * field::SHEETS_PER_PLANE + request.colored()
-}
-
-/// The buffer for what the pixels of some rows carry from plane to plane.
-fn carried(request: &FrameRequest, rows: u32) -> BufferSpec {
-    let records = u64::from(request.view.size[0]) * u64::from(rows) * u64::from(request.records());
-    buffer_spec("sheetsplat.carried", records * CARRIED_BYTES, BufferUsages::STORAGE | BufferUsages::COPY_SRC)
 }
 
 /// The sheet depths of the planes that any brick's kernels reach, and one more before and behind: where one of a slab's planes has no value, the other stands

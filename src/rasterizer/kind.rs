@@ -7,8 +7,10 @@ use crate::error::setting::SettingError;
 use crate::gpu::device::TILE_FEATURES;
 use crate::gpu::ramps::Stored;
 use crate::pass::composite::RayMode;
-use crate::pass::gather::WORKGROUP_BYTES;
-use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
+use crate::pass::gather::{MOST_LAYERS, WORKGROUP_BYTES};
+use crate::settings::splatting::{
+    Classification, FootprintBox, FootprintForm, Interpolation, Method, Rasterizer, Splatting,
+};
 
 /// The subgroup sizes that tiles support.
 const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=64;
@@ -73,17 +75,14 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
 /// Why tiles do not support some settings, or channels with them; `None` if they do.
 fn obstacle_in_settings(splatting: &Splatting, channels: &[Stored]) -> Option<RenderError> {
     let is_after = splatting.classification == Classification::After;
-    if is_after && channels.len() > 1 {
+    if is_after && channels.len() > MOST_LAYERS {
         let found = format!("splatting.classification = \"after\" and {} channels", channels.len());
-        return refused_tiles(found, "\"before\" with them, or \"quads\"");
+        return refused_tiles(found, &format!("at most {MOST_LAYERS}, \"before\" with them, or \"quads\""));
     }
-    if is_after && channels.iter().any(|channel| channel.colors > 0) {
-        let found = "splatting.classification = \"after\" and a volume of colours".to_owned();
-        return refused_tiles(found, "\"before\" with it, or \"quads\"");
-    }
-    if is_after && splatting.compositing.is_by_means() {
-        let found = "splatting.classification = \"after\" and a projection or \"surface\"".to_owned();
-        return refused_tiles(found, "another splatting.compositing, \"before\" with it, or \"quads\"");
+    let has_colors = channels.iter().any(|channel| channel.colors > 0);
+    if is_after && splatting.interpolation == Interpolation::Exact && (channels.len() > 1 || has_colors) {
+        let found = "splatting.interpolation = \"exact\" and several channels, or a volume of colours".to_owned();
+        return refused_tiles(found, "\"smooth\" with them, or \"quads\"");
     }
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();

@@ -1,6 +1,7 @@
 //! The rasterizers, which draw bricks into the compositing buffer. Each holds its stages' pipelines, prepares its part of a frame, and
 //! records it.
 
+pub(crate) mod carried;
 pub(crate) mod fields;
 pub(crate) mod kind;
 pub(crate) mod quads;

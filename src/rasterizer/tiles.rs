@@ -2,23 +2,29 @@
 
 use std::ops::Range;
 
+use bytemuck::Zeroable;
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits, TextureView};
 
+use super::carried::Carried;
 use super::{FrameEstimate, FrameInputs, Prepared};
 use crate::error::RenderError;
 use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
+use crate::gpu::brick_lists::BrickLists;
 use crate::gpu::counts::GroupSlabs;
 use crate::gpu::gathered_layout::GatheredLayout;
 use crate::gpu::layout::{Brick, FieldPlanes, Gather as GatherUniform, PatchRange};
+use crate::gpu::targets::BandBuffer;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::lists::patch_bins::{self, PatchBins, SHEETS};
-use crate::pass::gather::{self, Gather, GatherBand, GatherBuffers, GatherMode, PlaneMode, drawn_order};
-use crate::pass::values::PlaneBuffers;
+use crate::lists::patch_bins::{self, PatchBins, SHEETS, Work};
+use crate::pass::gather::{
+    Gather, GatherBand, GatherBuffers, GatherMode, GatheredPlanes, MOST_LAYERS, PlaneMode, drawn_order,
+    min_workgroup_bytes,
+};
 use crate::rasterizer::request::{After, FrameRequest};
-use crate::settings::splatting::Order;
+use crate::settings::splatting::{Compositing, Order};
 
 /// The rasterizer's stage.
 #[derive(Debug, Default)]
@@ -35,6 +41,8 @@ pub(crate) struct TileFrame {
     /// For every dispatch its band's index, and the offset and number of its patches.
     dispatches: Vec<(usize, u32, u32)>,
     bands: Vec<GatherBand>,
+    /// If values are gathered on planes.
+    carried: Option<Carried>,
 }
 
 /// The bins, which change only with the view or the bricks.
@@ -66,20 +74,29 @@ impl TileRasterizer {
     ) -> Result<(TileFrame, Prepared), RenderError> {
         let FrameInputs { device, queue, request, .. } = inputs;
         let limits = device.limits();
-        let (old_binned, old_buffers) = previous.map(|old| (old.binned, old.buffers)).unzip();
-        let bricks = inputs.list().all();
-        let (binned, is_new) = Binned::renewed(&limits, inputs, bricks, old_binned)?;
-        let results = GatheredLayout::new(&request.view, &binned.bins, bricks.len() as u32);
-        let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), inputs.list().lists.len())?;
+        let (old_binned, old_buffers, old_carried) = match previous {
+            Some(old) => (Some(old.binned), Some(old.buffers), old.carried),
+            None => (None, None, None),
+        };
+        let layers: Vec<&[Brick]> = inputs.lists().iter().map(BrickLists::all).collect();
+        let lists = inputs.lists().iter().map(|layer| layer.lists.len()).sum();
+        let (binned, is_new) = Binned::renewed(&limits, inputs, &layers, old_binned)?;
+        let results = GatheredLayout::new(&request.view, &binned.bins, count(&layers));
+        let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), lists)?;
         let (range_bytes, dispatches) = patch_ranges(&limits, request);
         let contents = (&binned.bins, &results, &range_bytes[..]);
-        let buffers = TileBuffers::filled(inputs, spec, contents, bricks, (old_buffers, is_new))?;
+        let buffers = TileBuffers::filled(inputs, spec, contents, &layers, (old_buffers, is_new))?;
         let coefficients = match request.after.as_ref().and_then(|after| after.needs.coefficients.as_ref()) {
             Some(exact) => Some(exact[request.layer.channels.start].texture(device, queue)?),
             None => None,
         };
-        let bands = self.bind(inputs, &binned.bins, &buffers, coefficients);
-        Ok((TileFrame { binned, buffers, results, dispatches, bands }, Prepared { bucketed: is_new, tabled: false }))
+        let carried = match &request.after {
+            Some(after) => Some(Carried::prepare(inputs, after.numbers[0].range, old_carried)?),
+            None => None,
+        };
+        let bands = self.bind(inputs, &binned.bins, (&buffers, carried.as_ref()), coefficients);
+        let frame = TileFrame { binned, buffers, results, dispatches, bands, carried };
+        Ok((frame, Prepared { bucketed: is_new, tabled: false }))
     }
 
     /// Binds the stage to every band of the compositing buffer.
@@ -87,7 +104,7 @@ impl TileRasterizer {
         &self,
         inputs: FrameInputs<'_>,
         bins: &PatchBins,
-        own: &TileBuffers<Buffer>,
+        (own, carried): (&TileBuffers<Buffer>, Option<&Carried>),
         coefficients: Option<&TextureView>,
     ) -> Vec<GatherBand> {
         let FrameInputs { device, volume, request, .. } = inputs;
@@ -99,11 +116,10 @@ impl TileRasterizer {
         let buffers = GatherBuffers {
             frame: inputs.frame,
             gather: &own.uniform,
-            planes: own.planes.as_ref().map(|planes| PlaneBuffers { planes, coefficients }),
+            planes: own.planes.as_ref().map(|planes| GatheredPlanes { planes, coefficients }),
             patch_ranges: &own.patch_ranges,
             bricks: own.bricks.as_ref().unwrap_or_else(|| &inputs.list().lists[0].buffer),
-            starts: &own.starts,
-            entries: &own.entries,
+            bins: &own.bins,
             control_points: inputs.control_points,
             values: volume.values(),
             colors: inputs.colors(),
@@ -112,23 +128,28 @@ impl TileRasterizer {
             half_boxes: &own.half_boxes,
             cut: inputs.cut,
         };
-        let bind = |acc| self.gather.bind(device, mode, buffers, acc, bins.dispatches);
-        inputs.compositing.bands.iter().map(|band| bind(&band.acc)).collect()
+        let carried = |band: usize| carried.map(|carried| &carried.bands[band]);
+        let bind = |(at, band): (usize, &BandBuffer)| {
+            self.gather.bind(device, mode, buffers, (&band.acc, carried(at)), bins.dispatches)
+        };
+        inputs.compositing.bands.iter().enumerate().map(bind).collect()
     }
 
-    /// The resources that a new frame of these bricks, in `lists` lists, needs.
+    /// The resources that a new frame of these layers' bricks, in `lists` lists, needs.
     ///
     /// # Errors
     /// As for [`Self::prepare`].
     pub(crate) fn estimate(
         limits: &Limits,
         request: &FrameRequest,
-        (bricks, lists): (&[Brick], usize),
+        (layers, lists): (&[&[Brick]], usize),
         by_label: bool,
     ) -> Result<FrameEstimate, RenderError> {
-        let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
-        let results = GatheredLayout::new(&request.view, &bins, bricks.len() as u32);
-        let buffers: Vec<BufferSpec> = TileBuffers::specs(limits, request, (&bins, &results), lists)?.all().collect();
+        let bins = bins(limits, request, layers, all_search_passes(request, by_label))?;
+        let results = GatheredLayout::new(&request.view, &bins, count(layers));
+        let mut buffers: Vec<BufferSpec> =
+            TileBuffers::specs(limits, request, (&bins, &results), lists)?.all().collect();
+        buffers.extend(request.after.iter().flat_map(|_| Carried::specs(request)));
         let bands = request.bands.len() as u64 * GatherBand::estimate(bins.dispatches);
         let groups = bins.groups as usize;
         Ok(FrameEstimate { bytes: sizes(limits, &buffers)? + bands, groups, passes: TileFrame::PASSES })
@@ -137,6 +158,7 @@ impl TileRasterizer {
     /// Draws the frame.
     pub(crate) fn record(&self, encoder: &mut CommandEncoder, timer: &mut Option<Timer>, frame: &TileFrame) {
         encoder.clear_buffer(&frame.buffers.gathered, 0, None);
+        frame.carried.iter().for_each(|carried| carried.clear(encoder));
         frame.bands.iter().for_each(|band| band.clear(encoder));
         let mut pass = encoder.begin_compute_pass(&super::compute("sheetsplat.gather", timer, "gather"));
         for &(band, offset, patches) in &frame.dispatches {
@@ -170,10 +192,16 @@ impl TileFrame {
         (&self.buffers.gathered, self.results.hits_byte())
     }
 
+    /// What pixels carry from plane to plane, if values are gathered on planes.
+    pub(crate) fn carried(&self) -> Option<&Carried> {
+        self.carried.as_ref()
+    }
+
     /// Bytes of GPU memory.
     pub(crate) fn gpu_bytes(&self) -> u64 {
         let bands: u64 = self.bands.iter().map(GatherBand::gpu_bytes).sum();
-        bands + self.buffers.each_ref().all().map(Buffer::size).sum::<u64>()
+        let carried = self.carried.as_ref().map_or(0, Carried::gpu_bytes);
+        bands + carried + self.buffers.each_ref().all().map(Buffer::size).sum::<u64>()
     }
 }
 
@@ -182,7 +210,7 @@ impl Binned {
     fn renewed(
         limits: &Limits,
         inputs: FrameInputs<'_>,
-        bricks: &[Brick],
+        layers: &[&[Brick]],
         old: Option<Self>,
     ) -> Result<(Self, bool), RenderError> {
         let FrameInputs { volume, request, .. } = inputs;
@@ -199,7 +227,7 @@ impl Binned {
             return Ok((old, false));
         }
         let binned = Self {
-            bins: bins(limits, request, bricks, search)?,
+            bins: bins(limits, request, layers, search)?,
             view: *view,
             order,
             planes,
@@ -216,27 +244,26 @@ impl Binned {
 #[derive(Debug)]
 struct TileBuffers<B> {
     uniform: B,
-    /// [`FieldPlanes`], if values are gathered on planes.
+    /// [`FieldPlanes`] of every layer, if values are gathered on planes.
     planes: Option<B>,
     patch_ranges: B,
-    starts: B,
-    entries: B,
+    bins: B,
     gathered: B,
     half_boxes: B,
-    /// All bricks in one buffer, if the volume's own are in several, or in none.
+    /// All bricks in one buffer, one layer after the other, if the volume's own are in several, or in none.
     bricks: Option<B>,
 }
 
 impl<B> TileBuffers<B> {
     fn all(self) -> impl Iterator<Item = B> {
-        let Self { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks } = self;
-        [uniform, patch_ranges, starts, entries, gathered, half_boxes].into_iter().chain(planes).chain(bricks)
+        let Self { uniform, planes, patch_ranges, bins, gathered, half_boxes, bricks } = self;
+        [uniform, patch_ranges, bins, gathered, half_boxes].into_iter().chain(planes).chain(bricks)
     }
 
     fn each_ref(&self) -> TileBuffers<&B> {
-        let Self { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks } = self;
+        let Self { uniform, planes, patch_ranges, bins, gathered, half_boxes, bricks } = self;
         let (planes, bricks) = (planes.as_ref(), bricks.as_ref());
-        TileBuffers { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks }
+        TileBuffers { uniform, planes, patch_ranges, bins, gathered, half_boxes, bricks }
     }
 }
 
@@ -246,7 +273,7 @@ impl TileBuffers<Buffer> {
         inputs: FrameInputs<'_>,
         spec: TileBuffers<BufferSpec>,
         (bins, results, range_bytes): (&PatchBins, &GatheredLayout, &[u8]),
-        bricks: &[Brick],
+        layers: &[&[Brick]],
         (old, is_new): (Option<Self>, bool),
     ) -> Result<Self, RenderError> {
         let FrameInputs { device, queue, request, .. } = inputs;
@@ -259,18 +286,21 @@ impl TileBuffers<Buffer> {
         let half_boxes: Vec<[f32; 2]> = bins.half_boxes.iter().map(|&pixels| uniforms::in_f32_pixels(pixels)).collect();
         let old = PreviousBuffers::of(old);
         Ok(Self {
-            starts: rewrite(old.starts, &spec.starts, bytemuck::cast_slice(&bins.starts))?,
-            entries: rewrite(old.entries, &spec.entries, bytemuck::cast_slice(&bins.entries))?,
+            bins: rewrite(old.bins, &spec.bins, bytemuck::cast_slice(&bins.words))?,
             half_boxes: write(old.half_boxes, &spec.half_boxes, bytemuck::cast_slice(&half_boxes))?,
             bricks: match spec.bricks {
-                Some(spec) => Some(rewrite(old.bricks, &spec, bytemuck::cast_slice(bricks))?),
+                Some(spec) => Some(rewrite(old.bricks, &spec, bytemuck::cast_slice(&layers.concat()))?),
                 None => None,
             },
             gathered: grown(device, old.gathered, &spec.gathered)?,
             uniform: write(old.uniform, &spec.uniform, bytemuck::bytes_of(&uniform))?,
             planes: match (spec.planes, &request.after) {
                 (Some(spec), Some(after)) => {
-                    let planes = request.planes(after, 0, inputs.volume.gpu_volume().value_format());
+                    let format = inputs.volume.gpu_volume().value_format();
+                    let mut planes = [FieldPlanes::zeroed(); MOST_LAYERS];
+                    for (layer, planes) in planes[..layers.len()].iter_mut().enumerate() {
+                        *planes = request.planes(after, layer, format);
+                    }
                     Some(write(old.planes, &spec, bytemuck::bytes_of(&planes))?)
                 }
                 _ => None,
@@ -310,10 +340,9 @@ impl TileBuffers<BufferSpec> {
             planes: request
                 .after
                 .as_ref()
-                .map(|_| content_spec("sheetsplat.planes", size_of::<FieldPlanes>() as u64, BufferUsages::UNIFORM)),
+                .map(|_| content_spec("sheetsplat.planes", PLANES_BYTES, BufferUsages::UNIFORM)),
             patch_ranges: content_spec("sheetsplat.patch_ranges", range_bytes, BufferUsages::UNIFORM),
-            starts: content_spec("sheetsplat.bin_starts", words(bins.starts.len()), storage),
-            entries: content_spec("sheetsplat.bin_entries", words(bins.entries.len()), storage),
+            bins: content_spec("sheetsplat.bins", words(bins.words.len()), storage),
             gathered: buffer_spec(
                 "sheetsplat.gathered",
                 gathered,
@@ -323,6 +352,14 @@ impl TileBuffers<BufferSpec> {
             bricks: brick_bytes.map(|bytes| content_spec("sheetsplat.all_bricks", bytes, storage)),
         })
     }
+}
+
+/// The size of what all layers are drawn onto planes by.
+const PLANES_BYTES: u64 = (MOST_LAYERS * size_of::<FieldPlanes>()) as u64;
+
+/// The number of bricks in some layers.
+fn count(layers: &[&[Brick]]) -> u32 {
+    layers.iter().map(|bricks| bricks.len() as u32).sum()
 }
 
 /// The maximum size of a storage binding in bytes.
@@ -351,14 +388,14 @@ fn range_stride(limits: &Limits) -> usize {
     size_of::<PatchRange>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
-fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) -> Result<PatchBins, RenderError> {
+fn bins(limits: &Limits, request: &FrameRequest, layers: &[&[Brick]], search: u32) -> Result<PatchBins, RenderError> {
     let FrameRequest { view, splatting, kernel, covered, after, .. } = request;
     let planes = after.as_ref().map(|after| &after.planes);
     let most_words = binding(limits) / 4;
     let (order, support) = (drawn_order(splatting), kernel.support());
-    let work = (search, request.subgroup_threads);
+    let work = Work { search, threads: request.subgroup_threads };
     let of_groups = (covered.clone(), &drawn(request));
-    Ok(PatchBins::new(bricks, (view, planes), order, of_groups, support, work, most_words)?)
+    Ok(PatchBins::new(layers, (view, planes), order, of_groups, support, work, most_words)?)
 }
 
 /// The slabs that are drawn: with planes also the one before the first that is composited, because a group holds its slabs' far planes.
@@ -370,12 +407,17 @@ fn drawn(request: &FrameRequest) -> Range<i32> {
 /// What is gathered on planes, if classification comes after splatting.
 fn plane_mode(request: &FrameRequest) -> Option<PlaneMode> {
     let After { gradient, needs, .. } = request.after.as_ref()?;
-    Some(PlaneMode { gradient: *gradient, exact: needs.coefficients.is_some() })
+    Some(PlaneMode {
+        gradient: *gradient,
+        exact: needs.coefficients.is_some(),
+        layers: request.stored.len() as u32,
+        own_colors: request.colored() > 0,
+    })
 }
 
 /// Checks that a patch's pixels fit into a workgroup's memory, of which sums with the kernel's gradient need most.
 fn check_workgroup_memory(limits: &Limits, request: &FrameRequest) -> Result<(), RenderError> {
-    let required = u64::from(gather::min_workgroup_bytes(plane_mode(request)));
+    let required = u64::from(min_workgroup_bytes(plane_mode(request)));
     let actual = u64::from(limits.max_compute_workgroup_storage_size);
     if required > actual {
         let (what, limit) = ("the tile rasterizer's sums", "max_compute_workgroup_storage_size");
@@ -384,14 +426,38 @@ fn check_workgroup_memory(limits: &Limits, request: &FrameRequest) -> Result<(),
     Ok(())
 }
 
-/// The passes through loops to look up a voxel's control points: all ramps are searched in memory if any is, because threads hold at most one
-/// point each.
+/// The passes through loops that a transfer function costs: before splatting those to look up a voxel's control points, where all ramps are searched in
+/// memory if any is, because threads hold at most one point each; after splatting those to find a surface in a slab.
 fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
+    if let Some(after) = &request.after {
+        let is_surface = request.splatting.compositing == Compositing::Surface;
+        return if is_surface { surface_passes(request, after, by_label) } else { 0 };
+    }
     let channels = request.ramps.channels;
     let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.subgroup_threads);
     let searches = 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>();
     if in_memory { channels * (1 + searches) } else { 0 }
+}
+
+/// The number of points that are tested for a surface in a cell of a table: `SAMPLES` of `shaders/shared/first_surface.wgsl` and one more, or its two ends.
+const TESTED_POINTS: [u32; 2] = [2, 33];
+
+/// The number of bisections between two of them: `F32_HALVINGS` there.
+const HALVINGS: u32 = 24;
+
+/// The maximum number of passes to find a surface in a slab.
+fn surface_passes(request: &FrameRequest, after: &After, by_label: bool) -> u32 {
+    let [.., points] = request.ramps.lengths();
+    let is_graded = points > 1;
+    // Every test may look up the gradient's opacity.
+    let of_test = 1 + if is_graded { 3 + search_passes(points) } else { 2 };
+    let tested = TESTED_POINTS[usize::from(is_graded)];
+    let cells = request.ramps.cells();
+    let of_cells = cells * (4 + tested * of_test) + HALVINGS * of_test + 2 * (2 + search_passes(cells.max(1)));
+    // Where each voxel has its own table, the way through its cell is searched by itself.
+    let borders = after.planes.slab_step(&request.view).to_array().map(|step| step as u32 + 2);
+    if by_label { borders.iter().sum::<u32>().saturating_mul(1 + of_cells) } else { of_cells }
 }
 
 /// The passes through loops of a binary search among `points` control points.
@@ -405,8 +471,7 @@ struct PreviousBuffers {
     uniform: Option<Buffer>,
     planes: Option<Buffer>,
     patch_ranges: Option<Buffer>,
-    starts: Option<Buffer>,
-    entries: Option<Buffer>,
+    bins: Option<Buffer>,
     gathered: Option<Buffer>,
     half_boxes: Option<Buffer>,
     bricks: Option<Buffer>,
@@ -414,16 +479,14 @@ struct PreviousBuffers {
 
 impl PreviousBuffers {
     fn of(old: Option<TileBuffers<Buffer>>) -> Self {
-        let Some(TileBuffers { uniform, planes, patch_ranges, starts, entries, gathered, half_boxes, bricks }) = old
-        else {
+        let Some(TileBuffers { uniform, planes, patch_ranges, bins, gathered, half_boxes, bricks }) = old else {
             return Self::default();
         };
         Self {
             uniform: Some(uniform),
             planes,
             patch_ranges: Some(patch_ranges),
-            starts: Some(starts),
-            entries: Some(entries),
+            bins: Some(bins),
             gathered: Some(gathered),
             half_boxes: Some(half_boxes),
             bricks,

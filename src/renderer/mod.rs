@@ -142,7 +142,8 @@ impl Renderer {
             let by_label = view.volume.shades_by_label(&request.layer);
             let tiles = match request.kind {
                 RasterizerKind::Tiles { insisted } if HAS_TILES => {
-                    match TileRasterizer::estimate(&limits, request, (all, lists.len()), by_label) {
+                    let layers: Vec<&[Brick]> = settled.iter().map(SettledBricks::all).collect();
+                    match TileRasterizer::estimate(&limits, request, (&layers, lists.len()), by_label) {
                         Err(error) if insisted => return Err(error),
                         needs => needs.ok(),
                     }

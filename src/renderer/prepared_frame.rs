@@ -10,6 +10,7 @@ use crate::gpu::layout::Band;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
 use crate::pass::join::JoinMode;
+use crate::rasterizer::carried::Carried;
 use crate::rasterizer::fields::FieldFrame;
 use crate::rasterizer::quads::QuadFrame;
 use crate::rasterizer::samples::SampleFrame;
@@ -199,6 +200,15 @@ impl Drawing {
             Self::Fields(frame) => Some(frame.first_hits()),
             Self::Tiles(frame) => Some(frame.first_hits()),
             Self::Samples(_) => None,
+        }
+    }
+
+    /// What pixels carry from plane to plane where values are classified after splatting.
+    pub(crate) fn carried(&self) -> Option<&Carried> {
+        match self {
+            Self::Fields(frame) => Some(frame.carried()),
+            Self::Tiles(frame) => frame.carried(),
+            Self::Quads(_) | Self::Samples(_) => None,
         }
     }
 

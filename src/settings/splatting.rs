@@ -213,9 +213,7 @@ impl Splatting {
 
     /// Whether no other setting excludes [`Classification::After`].
     pub(crate) fn allows_after(&self) -> bool {
-        // Tiles draw the other kinds of compositing only.
-        let is_excluded_by_tiles = self.rasterizer == Rasterizer::Tiles && self.compositing.is_by_means();
-        !is_excluded_by_tiles && self.check_after().is_ok()
+        self.check_after().is_ok()
     }
 
     /// Checks that the settings allow what of rays is looked at: whether anything is cut, and the opacity whose depth is asked for.

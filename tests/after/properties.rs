@@ -9,7 +9,7 @@ use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{BLACK, color_rms, psnr, rms};
-use crate::common::{BY_AMOUNTS, COMPOSITINGS, Random, camera, gpu, transfer};
+use crate::common::{BY_AMOUNTS, Random, camera, gpu, transfer};
 use crate::images::head;
 use crate::{eye, render, scene, volume};
 
@@ -19,26 +19,14 @@ struct Drawing {
     name: &'static str,
     /// The relative error of amounts.
     exactness: f64,
-    /// The compositings that it draws.
-    compositings: &'static [Compositing],
     draw: fn(&Volume, &Scene) -> Image,
 }
 
 const DRAWINGS: [Drawing; 4] = [
-    Drawing { name: "twin", exactness: 1e-5, compositings: &COMPOSITINGS, draw: render },
-    Drawing {
-        name: "quads",
-        exactness: 1e-4,
-        compositings: &COMPOSITINGS,
-        draw: |volume, scene| by(Rasterizer::Quads, volume, scene),
-    },
-    Drawing {
-        name: "tiles",
-        exactness: 1e-4,
-        compositings: &BY_AMOUNTS,
-        draw: |volume, scene| by(Rasterizer::Tiles, volume, scene),
-    },
-    Drawing { name: "cpu", exactness: 1e-4, compositings: &COMPOSITINGS, draw: by_cpu },
+    Drawing { name: "twin", exactness: 1e-5, draw: render },
+    Drawing { name: "quads", exactness: 1e-4, draw: |volume, scene| by(Rasterizer::Quads, volume, scene) },
+    Drawing { name: "tiles", exactness: 1e-4, draw: |volume, scene| by(Rasterizer::Tiles, volume, scene) },
+    Drawing { name: "cpu", exactness: 1e-4, draw: by_cpu },
 ];
 
 impl Drawing {
@@ -47,10 +35,6 @@ impl Drawing {
         let is_finite = image.pixels.iter().flatten().all(|channel| channel.is_finite());
         assert!(is_finite, "{}: a pixel that is not finite", self.name);
         image
-    }
-
-    fn draws(&self, compositing: Compositing) -> bool {
-        self.compositings.contains(&compositing)
     }
 }
 
@@ -85,9 +69,6 @@ fn constants_are_reconstructed() {
             (Compositing::Exponential, Interpolation::Exact, None),
             (Compositing::Xray, Interpolation::Smooth, Some(eye(15.0))),
         ] {
-            if !draw.draws(compositing) {
-                continue;
-            }
             let mut scene = scene(12, 12);
             scene.camera = camera([0.1, 1.0, -0.2], 6.0);
             scene.camera.center = Some(DVec3::new(-8.0, 0.0, 0.0));
@@ -118,9 +99,6 @@ fn normals_of_a_ramp() {
     for (draw, compositing) in DRAWINGS.into_iter().flat_map(|draw| {
         [Compositing::Surface, Compositing::Linear, Compositing::Exponential].map(|compositing| (draw, compositing))
     }) {
-        if !draw.draws(compositing) {
-            continue;
-        }
         for projection in [None, Some(eye(60.0))] {
             for light in [DVec3::new(-1.0, -0.5, 0.3), DVec3::new(0.2, -1.0, -0.9)] {
                 let mut scene = scene(16, 16);
@@ -198,9 +176,6 @@ fn thinner_slabs_converge() {
         for (projection, compositing) in
             [(None, Compositing::Exponential), (Some(eye(800.0)), Compositing::Xray), (None, Compositing::Maximum)]
         {
-            if !draw.draws(compositing) {
-                continue;
-            }
             let (volume, mut scene) = head();
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
             scene.splatting.compositing = compositing;
@@ -279,7 +254,7 @@ fn matter_at_the_end_of_the_range_is_matter() {
 /// Half a volume that hides everything behind it gives the same image as a surface and by nearly opaque compositing.
 #[test]
 fn surface_and_exponential_agree_on_an_opaque_step() {
-    for draw in DRAWINGS.into_iter().filter(|draw| draw.draws(Compositing::Surface)) {
+    for draw in DRAWINGS {
         let volume = volume([20, 20, 20], DVec3::ONE, |voxel| {
             let p = voxel.as_dvec3() - 9.5;
             if p.length() < 7.3 { 100.0 } else { 0.0 }

@@ -10,7 +10,7 @@ use sheetsplat::volume::Volume;
 
 use crate::common::compare::{assert_at_least, assert_at_most, decibels};
 use crate::common::images::{largest_difference, rms};
-use crate::common::{BY_AMOUNTS, Random, SPACINGS, gpu, random_eye, random_volume, transfer};
+use crate::common::{BY_AMOUNTS, COMPOSITINGS, Random, SPACINGS, gpu, random_eye, random_volume, transfer};
 
 /// A random volume, and a scene of it that classifies after splatting, unculled.
 fn random_case(random: &mut Random, has_eye: bool) -> (Volume, Scene) {
@@ -63,7 +63,7 @@ fn compare(seed: u64, has_eye: bool, least: f64, change: impl Fn(&mut Random, &m
     const CASES: usize = 6;
     let gpu = gpu();
     let mut random = Random(seed);
-    for compositing in BY_AMOUNTS {
+    for compositing in COMPOSITINGS {
         let (mut seen, mut worst) = (0, f64::INFINITY);
         for case in 0..CASES {
             let (mut volume, mut scene) = random_case(&mut random, has_eye);
@@ -77,7 +77,9 @@ fn compare(seed: u64, has_eye: bool, least: f64, change: impl Fn(&mut Random, &m
             assert_at_least(psnr, least, format!("{compositing:?}, case {case}: {scene:?}"));
         }
         println!("{compositing:?}: at least {worst:.1} dB");
-        assert!(seen > 2000, "{compositing:?}: {seen}");
+        // Of a ray's numbers most have no opacity.
+        let least_seen = if BY_AMOUNTS.contains(&compositing) { 2000 } else { 300 };
+        assert!(seen > least_seen, "{compositing:?}: {seen}");
     }
 }
 
@@ -111,7 +113,7 @@ fn frames_with_holes_agree_with_the_f64_evaluation() {
     });
 }
 
-/// Where so much lies behind a patch that it is drawn in several dispatches, each draws the group again whose last plane its first slab needs.
+/// Where so much lies behind a patch that it is drawn in several dispatches.
 #[test]
 fn frames_of_many_dispatches_agree_with_the_f64_evaluation() {
     let gpu = gpu();

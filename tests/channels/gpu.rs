@@ -26,15 +26,16 @@ fn modes() -> impl Iterator<Item = (Classification, Compositing)> {
 }
 
 /// The rasterizers that draw several channels.
-fn rasterizers(classification: Classification) -> &'static [Rasterizer] {
-    if classification == Classification::After { &[Rasterizer::Quads] } else { &RASTERIZERS }
+fn rasterizers(splatting: &Splatting) -> &'static [Rasterizer] {
+    // Each channel has coefficients of its own.
+    if splatting.interpolation == Interpolation::Exact { &[Rasterizer::Quads] } else { &RASTERIZERS }
 }
 
 /// Compares an image with the twin's.
 fn assert_is_the_twins(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, what: &str) {
     let Splatting { classification, compositing, .. } = scene.splatting;
     let expected = draw(Backend::Reference, volume, scene);
-    for &rasterizer in rasterizers(classification) {
+    for &rasterizer in rasterizers(&scene.splatting) {
         let actual = gpu.render_volume(volume.clone(), &by(rasterizer, scene)).unwrap();
         let what = format!("{what}, {classification:?} {compositing:?} by {rasterizer:?}");
         // Quads round amounts to f16.
@@ -150,7 +151,7 @@ fn neither_order_nor_empty_channels_matter() {
             let channels: Vec<_> = order.iter().map(|&number| channels[number]).collect();
             gpu.render_volume(joined(&channels), &scene).unwrap().image
         };
-        for &rasterizer in rasterizers(classification) {
+        for rasterizer in RASTERIZERS {
             let distance = largest_difference(&image(rasterizer, &[0, 1, 2]), &image(rasterizer, &[2, 0, 1]));
             println!("{classification:?} {compositing:?} by {rasterizer:?}: {distance:.1e}");
             // Sums of channels that are rounded to f16 may round differently.
@@ -176,7 +177,7 @@ fn what_opaque_sums_hide_is_culled() {
         // Opaque only together.
         let dense = transfer(&[(0.0, [0.9, 0.5, 0.2]), (200.0, [0.3, 0.9, 1.0])], &[(20.0, 0.0), (90.0, 0.6)]);
         set_transfers(&mut scene, &[dense.clone(), dense.clone(), dense]);
-        for &rasterizer in rasterizers(classification) {
+        for rasterizer in RASTERIZERS {
             let mut scene = by(rasterizer, &scene);
             let whole = gpu.render_volume(volume.clone(), &scene).unwrap();
             scene.splatting.culling = true;
@@ -221,11 +222,6 @@ fn one_channel_is_a_scene_of_one_volume() {
     let table = parse(&format!("[[channel]]\nname = 'head'\nvolume.builtin = 'head:20'\n{keys}"));
     for (classification, compositing) in modes() {
         for rasterizer in RASTERIZERS {
-            let is_by_means =
-                !matches!(compositing, Compositing::Linear | Compositing::Exponential | Compositing::Xray);
-            if classification == Classification::After && is_by_means && rasterizer == Rasterizer::Tiles {
-                continue;
-            }
             let [first, second] = [&one, &table].map(|scene| {
                 let mut scene = by(rasterizer, scene);
                 (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
@@ -292,7 +288,7 @@ fn picks_are_those_of_the_native_backend() {
         let mut native = sheetsplat::cpu::CpuRenderer::new(volume.clone(), &scene).unwrap();
         native.set_first_hit(Some(opacity)).unwrap();
         native.draw().unwrap();
-        for &rasterizer in rasterizers(classification) {
+        for rasterizer in RASTERIZERS {
             let mut view = gpu.view(volume.clone(), &by(rasterizer, &scene)).unwrap();
             view.set_first_hit(Some(opacity)).unwrap();
             gpu.draw(&mut view).unwrap();
@@ -324,13 +320,15 @@ fn tiles_that_do_not_draw_channels_leave_them_to_quads() {
     let mut random = Random(2);
     let (volume, mut scene) = random_case(&mut random, 2);
     scene.splatting.classification = Classification::After;
+    assert_eq!(gpu.render_volume(volume.clone(), &scene).unwrap().stats.rasterizer, "tiles");
+    scene.splatting.interpolation = Interpolation::Exact;
     let auto = gpu.render_volume(volume.clone(), &scene).unwrap();
     assert_eq!(auto.stats.rasterizer, "quads");
     assert_eq!(auto.image, gpu.render_volume(volume.clone(), &by(Rasterizer::Quads, &scene)).unwrap().image);
     let error = gpu.render_volume(volume, &by(Rasterizer::Tiles, &scene)).unwrap_err().to_string();
     assert!(
         error.starts_with(
-            "splatting.rasterizer: found \"tiles\" with splatting.classification = \"after\" and 2 channels"
+            "splatting.rasterizer: found \"tiles\" with splatting.interpolation = \"exact\" and several channels"
         ),
         "{error}"
     );
@@ -390,16 +388,19 @@ fn memory_grows_with_the_channels() {
     let (one, four) = (bytes(&single(&volume)), bytes(&volume));
     assert!(four <= 4 * one && four > one, "{four} and {one} bytes");
     let channels: Vec<Volume> = volume.channels().map(single).collect();
-    for (classification, compositing) in modes() {
+    for ((classification, compositing), rasterizer) in
+        modes().flat_map(|mode| RASTERIZERS.map(|rasterizer| (mode, rasterizer)))
+    {
         let used_by = |volume: &Volume, count| {
             let (volume, mut scene) = first_channels(volume, &scene, count);
             (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
-            scene.splatting.rasterizer = Rasterizer::Quads;
+            scene.splatting.rasterizer = rasterizer;
             gpu.render_volume(volume, &scene).unwrap().stats.gpu_bytes
         };
         let alone: Vec<u64> = channels.iter().map(|channel| used_by(channel, 1)).collect();
         let used = [1, 2, 3, 4].map(|count| used_by(&volume, count));
-        let what = format!("{classification:?} {compositing:?}: {used:?} bytes, channels alone {alone:?}");
+        let what =
+            format!("{classification:?} {compositing:?} by {rasterizer:?}: {used:?} bytes, channels alone {alone:?}");
         // The buffers that join images come with the second channel.
         let joined = 20 * 32 * 32 + 1024;
         for (count, &used_by) in (1..).zip(&used) {

@@ -6,8 +6,9 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec4, UVec3};
 use sheetsplat::internals::brick::{self, BrickList};
+use sheetsplat::internals::gpu::layout::Brick;
 use sheetsplat::internals::kernel::Kernel;
-use sheetsplat::internals::patch_bins::{self, PATCH, PatchBins, SHEETS, TileCapacityError};
+use sheetsplat::internals::patch_bins::{self, PATCH, PatchBins, SHEETS, TileCapacityError, Work};
 use sheetsplat::internals::reference::{self, Geometry};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
@@ -55,15 +56,24 @@ impl Case {
 
     /// The bins of some slabs.
     fn bins_of(&self, drawn: &Range<i32>, most_words: u64) -> Result<PatchBins, TileCapacityError> {
+        self.bins_of_layers(&[self.bricks.bricks()], drawn, most_words)
+    }
+
+    fn bins_of_layers(
+        &self,
+        layers: &[&[Brick]],
+        drawn: &Range<i32>,
+        most_words: u64,
+    ) -> Result<PatchBins, TileCapacityError> {
         let Scene { camera, splatting, image, .. } = &self.scene;
         let view = ViewGeometry::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
         PatchBins::new(
-            self.bricks.bricks(),
+            layers,
             (&view, None),
             splatting.order,
             (0.0..0.0, drawn),
             self.kernel().support(),
-            (0, 8),
+            Work { search: 0, threads: 8 },
             most_words,
         )
     }
@@ -99,13 +109,13 @@ impl Case {
         let [columns, _] = patch_bins::grid([self.scene.image.width, self.scene.image.height]);
         let first_group = bins.first_slab.div_euclid(SHEETS as i32);
         let mut held = BTreeSet::new();
-        for (bin, bounds) in bins.starts.windows(2).enumerate() {
+        for (bin, bounds) in bins.starts().windows(2).enumerate() {
             let (tile, at) = (bin as u32 / bins.groups, bin as u32 % bins.groups);
             let in_order = match self.scene.splatting.order {
                 Order::FrontToBack => at,
                 Order::BackToFront => bins.groups - 1 - at,
             };
-            let entries = &bins.entries[bounds[0] as usize..bounds[1] as usize];
+            let entries = &bins.words[bounds[0] as usize..bounds[1] as usize];
             let position = |entry: &u32| brick::position(&self.bricks.bricks()[*entry as usize]);
             assert!(entries.is_sorted_by(|a, b| position(a) < position(b)), "in memory order, once each");
             let at = [tile % columns, tile / columns];
@@ -155,10 +165,48 @@ fn dispatches_are_enough() {
         (case.scene.splatting.radius, case.scene.splatting.slab_width) = (1.5, slab_width);
         let bins = case.bins(u64::MAX).unwrap();
         assert_eq!(bins.dispatches == 1, is_one, "{side} {slab_width}: {}", bins.dispatches);
-        let (passes, bricks) = (bins.passes, bins.entries.len() as u32);
+        let (passes, bricks) = (bins.passes, bins.words.len() as u32 - bins.bins - 1);
         let all = bins.groups * passes.per_group + bricks * passes.per_brick;
         assert!(bins.dispatches * passes.most >= all, "{} for {all}", bins.dispatches);
         assert!(bins.dispatches <= 2 * (all / passes.most) + 1, "{} for {all}", bins.dispatches);
+    }
+}
+
+/// The bins of a layer are its own, with bricks numbered behind those of the layers before it.
+#[test]
+fn layers_have_bins_of_their_own() {
+    let mut random = Random(54);
+    for _ in 0..6 {
+        let mut case = Case::new(&mut random, [1.0, 1.0, 2.0], [64, 48]);
+        case.scene.splatting.order = Order::FrontToBack;
+        let others = BrickList::new(&case.grid, &[7, 900, 2100, 3500]);
+        let of = |layers: &[&[Brick]]| case.bins_of_layers(layers, &Window::whole([1; 2]).slabs, u64::MAX).unwrap();
+        let layers = [case.bricks.bricks(), others.bricks()];
+        let all = of(&layers);
+        assert_eq!(all.bins, 2 * all.patches * all.groups);
+        let entries = |bins: &PatchBins, layer: u32, patch: u32, group: i32| -> Vec<u32> {
+            if !(0..bins.groups as i32).contains(&group) {
+                return Vec::new();
+            }
+            let bin = ((layer * bins.patches + patch) * bins.groups + group as u32) as usize;
+            bins.words[bins.starts()[bin] as usize..bins.starts()[bin + 1] as usize].to_vec()
+        };
+        let mut first = 0;
+        for (layer, bricks) in (0..).zip(layers) {
+            let alone = of(&[bricks]);
+            // A layer may not reach the first group of all.
+            let before = (alone.first_slab - all.first_slab) / SHEETS as i32;
+            let mut held = 0;
+            for (patch, group) in
+                (0..all.patches).flat_map(|patch| (0..all.groups as i32).map(move |group| (patch, group)))
+            {
+                let expected = entries(&alone, 0, patch, group - before).into_iter().map(|brick| brick + first);
+                held += expected.len();
+                assert_eq!(entries(&all, layer, patch, group), expected.collect::<Vec<_>>());
+            }
+            assert!(held > 0, "layer {layer}");
+            first += bricks.len() as u32;
+        }
     }
 }
 
@@ -168,11 +216,12 @@ fn quantities_that_exceed_the_capacity_are_named() {
     let mut case = Case::new(&mut random, [1.0; 3], [64, 48]);
     case.scene.camera = camera([0.3, 0.9, -0.2], 30.0);
     let bins = case.bins(u64::MAX).unwrap();
-    let [starts, entries] = [&bins.starts, &bins.entries].map(|list| list.len() as u64);
-    assert!(starts < entries);
-    assert_eq!(case.bins(entries).as_ref(), Ok(&bins), "just enough room");
+    let [starts, all] = [bins.starts().len(), bins.words.len()].map(|count| count as u64);
+    let entries = all - starts;
+    assert!(entries > 1);
+    assert_eq!(case.bins(all).as_ref(), Ok(&bins), "just enough room");
     let unfit = |what, required, actual| Err(TileCapacityError { what, required, actual });
-    assert_eq!(case.bins(entries - 1), unfit("bricks in patches and sheet groups", entries, entries - 1));
+    assert_eq!(case.bins(all - 1), unfit("bricks in patches and sheet groups", entries, entries - 1));
     assert_eq!(case.bins(starts - 1), unfit("patches times sheet groups", starts - 1, starts - 2));
 
     // 2744 bricks are behind two pixels, in four sheets.

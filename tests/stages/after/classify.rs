@@ -18,11 +18,11 @@ use sheetsplat::internals::reference::Host;
 use sheetsplat::internals::reference::after::{Frame, Sample};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Compositing, Gradient, LabelTables, Order, Projection, Ramp, Window};
+use sheetsplat::settings::{Compositing, Gradient, LabelTables, Order, Ramp, Window};
 use sheetsplat::volume::Labels;
 use sheetsplat::wgpu::{self, BufferUsages};
 
-use super::{PERSPECTIVE, Prepared, assert_hits, cut, head, head_scene, with_case, with_host};
+use super::{PERSPECTIVE, Prepared, assert_hits, cut, head, head_scene, resolved, shown_by, with_case, with_host};
 use crate::common::compare::{apart, assert_at_least, assert_at_most, decibels, largest, root_mean_square};
 use crate::common::surfaces::{DepthRange, surfaces};
 use crate::common::{COMPOSITINGS, gpu};
@@ -152,14 +152,6 @@ impl Rays<'_> {
     }
 }
 
-/// What the compositing buffer means: for a minimum it holds 2 minus the opacity, and 0 for nothing.
-fn resolved(compositing: Compositing, color: DVec4) -> DVec4 {
-    match compositing {
-        Compositing::Minimum if color.w > 0.0 => color.truncate().extend(2.0 - color.w),
-        _ => color,
-    }
-}
-
 fn check(prepared: &Prepared<'_>, twin: &Frame<'_>) {
     check_rays(prepared, twin, Rays::default(), 110.0);
 }
@@ -181,23 +173,6 @@ fn check_rays(prepared: &Prepared<'_>, twin: &Frame<'_>, rays: Rays<'_>, least: 
         let hits = assert_hits(prepared, twin, &hits, &name);
         assert!(hits > 20, "{name}: {hits} hits");
     }
-}
-
-/// A scene in which a compositing shows much.
-fn shown_by(compositing: Compositing, projection: Option<Projection>) -> Scene {
-    let mut scene = head_scene(projection);
-    scene.splatting.compositing = compositing;
-    let opacity: Option<&[(f64, f64)]> = match compositing {
-        Compositing::Maximum => Some(&[(20.0, 0.0), (100.0, 0.2), (250.0, 0.9)]),
-        Compositing::Minimum => Some(&[(0.0, 0.9), (60.0, 0.6), (250.0, 0.1)]),
-        Compositing::Average => Some(&[(10.0, 0.0), (60.0, 0.7), (90.0, 0.2)]),
-        Compositing::Surface => Some(&[(30.0, 0.0), (70.0, 0.7), (200.0, 0.8)]),
-        _ => None,
-    };
-    if let Some(points) = opacity {
-        scene.transfer.opacity = Some(Ramp::new(points.to_vec()).unwrap());
-    }
-    scene
 }
 
 /// With the kernel's gradient, of which rounding leaves fewer digits.

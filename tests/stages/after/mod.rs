@@ -9,12 +9,12 @@ mod values;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use glam::{DVec3, UVec3};
+use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::after::normalization::Normalization;
 use sheetsplat::internals::brick;
 use sheetsplat::internals::brick::BrickList;
-use sheetsplat::internals::gpu::layout::{Brick, FieldVoxel};
+use sheetsplat::internals::gpu::layout::{Brick, FieldPlanes, FieldVoxel};
 use sheetsplat::internals::gpu::ramps::{Integration, Ramps, Stored};
 use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
@@ -23,7 +23,7 @@ use sheetsplat::internals::plane_geometry::PlaneGeometry;
 use sheetsplat::internals::reference::{Host, after::Frame};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Classification, Gradient, Interpolation, Projection, TransferFunction};
+use sheetsplat::settings::{Classification, Compositing, Gradient, Interpolation, Projection, Ramp, TransferFunction};
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Buffer, BufferUsages};
 
@@ -88,6 +88,7 @@ struct Prepared<'a> {
     bricks: Vec<Brick>,
     values: VolumeTexture,
     frame: Buffer,
+    field_planes: FieldPlanes,
     /// One `FieldPlanes`.
     planes: Buffer,
     control_points: Buffer,
@@ -121,6 +122,7 @@ impl<'a> Prepared<'a> {
             name: format!("{name}, {:?}", scene.shading.gradient),
             bricks: BrickList::new(grid, &voxels).bricks().to_vec(),
             frame: init(device, &[frame], BufferUsages::UNIFORM),
+            field_planes: planes,
             planes: init(device, &[planes], BufferUsages::UNIFORM),
             control_points: init(device, &ramps.points, BufferUsages::STORAGE),
             volume,
@@ -223,4 +225,29 @@ fn gradient_of(record: &FieldVoxel) -> DVec3 {
     let part = |bits: u32| f64::from(bits as u16 as i16) / 32767.0;
     let scale = power_of_2((record.gradient_z >> 16) as i32 - 256);
     DVec3::new(part(record.gradient_xy), part(record.gradient_xy >> 16), part(record.gradient_z)) * scale
+}
+
+/// What the compositing buffer means: for a minimum it holds 2 minus the opacity, and 0 for nothing.
+fn resolved(compositing: Compositing, color: DVec4) -> DVec4 {
+    match compositing {
+        Compositing::Minimum if color.w > 0.0 => color.truncate().extend(2.0 - color.w),
+        _ => color,
+    }
+}
+
+/// A scene in which a compositing shows much.
+fn shown_by(compositing: Compositing, projection: Option<Projection>) -> Scene {
+    let mut scene = head_scene(projection);
+    scene.splatting.compositing = compositing;
+    let opacity: Option<&[(f64, f64)]> = match compositing {
+        Compositing::Maximum => Some(&[(20.0, 0.0), (100.0, 0.2), (250.0, 0.9)]),
+        Compositing::Minimum => Some(&[(0.0, 0.9), (60.0, 0.6), (250.0, 0.1)]),
+        Compositing::Average => Some(&[(10.0, 0.0), (60.0, 0.7), (90.0, 0.2)]),
+        Compositing::Surface => Some(&[(30.0, 0.0), (70.0, 0.7), (200.0, 0.8)]),
+        _ => None,
+    };
+    if let Some(points) = opacity {
+        scene.transfer.opacity = Some(Ramp::new(points.to_vec()).unwrap());
+    }
+    scene
 }

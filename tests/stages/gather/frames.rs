@@ -136,7 +136,7 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
         assert!(whole.acc.iter().any(|pixel| pixel.w > 0.9));
         assert!(whole.tally.sections_rasterized > 10_000, "{:?}", whole.tally);
         // The maximum number of bricks in a group.
-        let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
+        let bricks = bins.starts().windows(2).map(|group| group[1] - group[0]).max().unwrap();
         let one_group = bins.passes.per_group + bricks * bins.passes.per_brick;
         // This suffices for all groups if each dispatch processes one.
         let dispatches = bins.groups;
@@ -173,7 +173,7 @@ fn the_minimum_extends_behind_all_bricks() {
     scene.splatting.compositing = Compositing::Minimum;
     let fixture = Fixture::new(&gpu, &stage, scene, volume);
     let bins = fixture.bins();
-    let bricks = bins.starts.windows(2).map(|group| group[1] - group[0]).max().unwrap();
+    let bricks = bins.starts().windows(2).map(|group| group[1] - group[0]).max().unwrap();
     let passes = Passes { most: bins.passes.per_group + bricks * bins.passes.per_brick, ..bins.passes };
     let middle = |dispatches| {
         let bins = PatchBins { passes, dispatches, ..bins.clone() };
@@ -197,7 +197,7 @@ fn more_voxels_than_the_queue_holds() {
         (scene.splatting.slab_width, scene.splatting.order, scene.splatting.culling) = (slab_width, order, false);
         let fixture = Fixture::new(&gpu, &stage, scene, volume);
         let bins = fixture.bins();
-        let bricks = bins.starts.windows(2).map(|bin| bin[1] - bin[0]).max().unwrap();
+        let bricks = bins.starts().windows(2).map(|bin| bin[1] - bin[0]).max().unwrap();
         // The queue holds a few hundred voxels; two thirds of all voxels are drawn.
         assert!(bricks * 64 > 3000 || slab_width < 1.0, "{bricks} bricks");
         let (actual, expected) = (fixture.draw(&bins, None, &fixture.empty(), u32::MAX).acc, fixture.twin());

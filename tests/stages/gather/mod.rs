@@ -13,7 +13,7 @@ use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::gpu::volume_texture::{SIDES, VolumeTexture};
 use sheetsplat::internals::pass::composite::{CutBuffers, RayMode};
 use sheetsplat::internals::pass::gather::{Gather, GatherBuffers, GatherMode};
-use sheetsplat::internals::patch_bins::{self, HALVES, PatchBins, SHEETS};
+use sheetsplat::internals::patch_bins::{self, HALVES, PatchBins, SHEETS, Work};
 use sheetsplat::internals::{ClippedVoxels, means, reference};
 use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::settings::{Compositing, FootprintForm, TransferFunction, Window};
@@ -57,12 +57,12 @@ impl<'a> Fixture<'a> {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
         PatchBins::new(
-            self.bricks.bricks(),
+            &[self.bricks.bricks()],
             (view, None),
             splatting.order,
             (covered, &Window::whole([1; 2]).slabs),
             kernel.support(),
-            (0, 8),
+            Work { search: 0, threads: 8 },
             u64::MAX,
         )
         .unwrap()
@@ -123,8 +123,7 @@ impl<'a> Fixture<'a> {
             planes: None,
             patch_ranges: &ranges_buffer,
             bricks: &init(device, bricks, BufferUsages::STORAGE),
-            starts: &storage(&bins.starts),
-            entries: &storage(&bins.entries),
+            bins: &storage(&bins.words),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             values: &values.view,
             colors: None,
@@ -133,7 +132,8 @@ impl<'a> Fixture<'a> {
             half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),
             cut: CutBuffers { uniform: &init(device, &[cut], BufferUsages::UNIFORM), ..uncut.buffers() },
         };
-        let bound: Vec<_> = accs.iter().map(|acc| stage.bind(device, mode, buffers, acc, bins.dispatches)).collect();
+        let bound: Vec<_> =
+            accs.iter().map(|acc| stage.bind(device, mode, buffers, (acc, None), bins.dispatches)).collect();
         compute(gpu, |pass| {
             for (at, range) in ranges.iter().enumerate() {
                 let tiles = range.end_patch - range.first_patch;
@@ -224,8 +224,8 @@ fn sections() {
                     first_slab: first,
                     patches: tiles,
                     groups: 1,
-                    starts: (0..=tiles).collect(),
-                    entries: vec![0; tiles as usize],
+                    words: (tiles + 1..=2 * tiles + 1).chain((0..tiles).map(|_| 0)).collect(),
+                    bins: tiles,
                     half_boxes: vec![view.half_box(kernel.support(), 0.0..1.0)],
                     workgroups: 1,
                     passes: fixture.bins().passes,

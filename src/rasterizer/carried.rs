@@ -1,0 +1,54 @@
+//! What pixels carry from plane to plane where values are classified after splatting (SPEC §9); `shaders/shared/slab.wgsl` describes the records.
+
+use wgpu::{Buffer, BufferUsages, CommandEncoder};
+
+use super::FrameInputs;
+use crate::error::RenderError;
+use crate::gpu::bindings::{BufferSpec, buffer_spec, grown};
+use crate::gpu::layout::Band;
+use crate::pass::classify::CARRIED_BYTES;
+use crate::rasterizer::request::FrameRequest;
+
+/// The records of a frame's pixels.
+#[derive(Debug)]
+pub(crate) struct Carried {
+    /// One buffer for every band of the compositing buffer.
+    pub(crate) bands: Vec<Buffer>,
+    /// The minimum and maximum number of the first channel's coefficients.
+    pub(crate) range: [f32; 2],
+}
+
+impl Carried {
+    /// Allocates buffers that no longer fit.
+    ///
+    /// # Errors
+    /// If they exceed the device's maximum size of buffers.
+    pub(crate) fn prepare(
+        FrameInputs { device, request, .. }: FrameInputs<'_>,
+        range: [f32; 2],
+        old: Option<Self>,
+    ) -> Result<Self, RenderError> {
+        let mut old = old.map(|old| old.bands).unwrap_or_default().into_iter();
+        let bands = Self::specs(request).map(|spec| grown(device, old.next(), &spec)).collect::<Result<_, _>>()?;
+        Ok(Self { bands, range })
+    }
+
+    /// The specs of the buffers.
+    pub(crate) fn specs(request: &FrameRequest) -> impl Iterator<Item = BufferSpec> {
+        let (width, records) = (u64::from(request.view.size[0]), u64::from(request.records()));
+        request.bands.iter().map(move |&Band { rows, .. }| {
+            let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
+            buffer_spec("sheetsplat.carried", width * u64::from(rows) * records * CARRIED_BYTES, usage)
+        })
+    }
+
+    /// Clears the records for a frame.
+    pub(crate) fn clear(&self, encoder: &mut CommandEncoder) {
+        self.bands.iter().for_each(|band| encoder.clear_buffer(band, 0, None));
+    }
+
+    /// Bytes of GPU memory.
+    pub(crate) fn gpu_bytes(&self) -> u64 {
+        self.bands.iter().map(Buffer::size).sum()
+    }
+}
