@@ -54,7 +54,7 @@ use crate::error::RenderError;
 use crate::error::setting::{Interval, SettingError};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
-use crate::part::{self, Part};
+use crate::part::{self, Content, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::{ImageSettings, Scene};
@@ -253,6 +253,13 @@ impl CpuRenderer {
         let (Drawing { content, counts, .. }, view) = self.drawing(window.clone(), true)?;
         let part = Part::new((&self.volume.clone().into(), &self.scene), &view, window, content)?;
         Ok((part, statistics(self.simd, self.size(), counts, start)))
+    }
+
+    /// Draws the pixels of a part, and returns them with statistics.
+    pub(crate) fn draw_content(&mut self, window: &Window) -> Result<(Content, Stats), RenderError> {
+        let start = Instant::now();
+        let (Drawing { content, counts, .. }, _) = self.drawing(window.clone(), true)?;
+        Ok((content, statistics(self.simd, self.size(), counts, start)))
     }
 
     /// The image's width and height.

@@ -139,9 +139,7 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.draw_part(window),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw_part(window),
-            (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => {
-                view.draw_part(window, &mut |volume, scene, window| self.draw_box(volume, scene, window))
-            }
+            (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => view.draw_part(window, self),
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
         Ok((part, Stats { store: stats.store.or(reads), ..stats }))
@@ -167,10 +165,10 @@ impl Headless {
         Ok(HeadlessView::new(backend, reads))
     }
 
-    /// A view of a volume that is read while it is drawn.
+    /// A view of a volume that is read while it is drawn: on the CPU chunk by chunk, if it has one channel without labels, otherwise box by box.
     fn stream(&self, volume: StreamedVolume, scene: &Scene) -> Result<HeadlessView, RenderError> {
         #[cfg(feature = "cpu")]
-        if self.draws_by_cpu() {
+        if self.draws_by_cpu() && volume.only_values().is_some() {
             return Ok(HeadlessView::new(ViewBackend::Stream(Box::new(StreamRenderer::new(volume, scene)?)), None));
         }
         let view = BoxedView::new(volume, scene, self.backend())?;
@@ -182,9 +180,8 @@ impl Headless {
         match &self.drawer {
             #[cfg(feature = "gpu")]
             Drawer::Gpu(gpu) => gpu.draw_content(&mut gpu.view(volume, scene)?, window),
-            // It reads chunk by chunk.
             #[cfg(feature = "cpu")]
-            Drawer::Cpu => Err(self.refuse(Backend::Cpu).into()),
+            Drawer::Cpu => CpuRenderer::new(volume, scene)?.draw_content(window),
             Drawer::Reference => {
                 let (content, _, stats) = ReferenceView::new(volume, scene)?.draw_content(window)?;
                 Ok((content, stats))
@@ -234,9 +231,7 @@ impl Headless {
             #[cfg(feature = "cpu")]
             (_, ViewBackend::Stream(view)) if self.draws_by_cpu() => view.draw(),
             (Drawer::Reference, ViewBackend::Reference(view)) => view.draw(),
-            (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => {
-                view.draw(&mut |volume, scene, window| self.draw_box(volume, scene, window))
-            }
+            (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => view.draw(self),
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
         let store = rendering.stats.store.or(reads);

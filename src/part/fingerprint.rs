@@ -4,13 +4,13 @@ use std::path::Path;
 
 use crate::scene::{OpenVolume, Scene, SceneError, VolumeSource};
 use crate::settings::splatting::Rasterizer;
-use crate::volume::Volume;
+use crate::volume::{StreamedVolume, Volume};
 
 /// The text that begins what is hashed; another meaning of fingerprints needs another text.
 const DOMAIN: &str = "sheetsplat part 1\n";
 
-/// The fingerprint of a scene of a volume, as hexadecimal digits. It is the same on every machine. Of a volume that is streamed it has the store's identity in
-/// place of the values.
+/// The fingerprint of a scene of a volume, as hexadecimal digits. It is the same on every machine. Of a volume that is streamed it has the identities of its
+/// stores in place of the values.
 ///
 /// # Errors
 /// If the scene cannot be written as TOML.
@@ -30,9 +30,22 @@ pub(super) fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, 
     }
     match volume {
         OpenVolume::Whole(volume) => add_values(&mut hash, volume),
-        OpenVolume::Streamed(volume) => _ = hash.update(volume.store.identity().as_bytes()),
+        OpenVolume::Streamed(volume) => add_identities(&mut hash, volume),
     }
     Ok(hash.finalize().to_hex().to_string())
+}
+
+/// Hashes what identifies the stores of channels and labels: digits, each but the first behind a word that says what it is of.
+fn add_identities(hash: &mut blake3::Hasher, volume: &StreamedVolume) {
+    for (number, channel) in volume.channels().enumerate() {
+        if number > 0 {
+            hash.update(b"\nchannel ");
+        }
+        hash.update(channel.values.store.identity().as_bytes());
+        if let Some(labels) = &channel.labels {
+            hash.update(b"\nlabels ").update(labels.store.identity().as_bytes());
+        }
+    }
 }
 
 /// Hashes values, labels and colours, in blocks, because the hash is fastest over long slices.

@@ -151,6 +151,16 @@ impl Scene {
         (0..).zip(volume.channels()).map(channel).collect()
     }
 
+    /// The scene with only some of its channels, by their numbers in ascending order, for a volume of these. The scene must have settings for each of them.
+    pub(crate) fn of_channels(&self, numbers: &[usize]) -> Self {
+        let kept = self.channels().enumerate().filter(|(number, _)| numbers.contains(number));
+        let mut kept = kept.map(|(_, channel)| channel.into_owned());
+        let Some(first) = kept.next() else { return self.clone() };
+        let Channel { name, visible, volume, spacing, labels, index, time, level, transfer } = first;
+        let further = kept.collect();
+        Self { name, visible, volume, spacing, labels, index, time, level, transfer, further, ..self.clone() }
+    }
+
     /// The name of a channel of a volume: the scene's, the file's, or `channel N`, counted from 0.
     pub fn channel_name(&self, volume: &Volume, number: usize) -> String {
         let stated = self.channels().nth(number).and_then(|channel| channel.name.clone());

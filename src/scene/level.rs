@@ -6,7 +6,9 @@ use glam::DVec3;
 
 use super::{ImageSettings, Scene, VolumeSource, load};
 use crate::settings::camera::{Camera, Projection};
-use crate::volume::{Access, Grid, ReadOptions, Volume, VolumeError, is_address, levels, sample};
+use crate::volume::{
+    Access, Grid, ReadOptions, Volume, VolumeError, check_grids, is_address, levels, sample_of_channels,
+};
 
 /// The number of bytes of values by which a camera is framed that fits the object: enough for its box, and quickly read.
 const FRAME_BYTES: u64 = 1 << 24;
@@ -145,9 +147,10 @@ fn coarse_volume(scene: &Scene, open: &[Open], options: &ReadOptions) -> Result<
     let bytes = FRAME_BYTES.min(options.memory_limit() / 8);
     let is_small = |grid: &Grid| grid.voxels().saturating_mul(4) <= bytes;
     if open.iter().any(|(_, levels)| !levels.iter().any(is_small))
-        && let (Some(Ok(store)), Some(path)) = (scene.open_store(options), scene.volume.path())
+        && let Some(Ok((first, further))) = load::streamed(scene, &Access::new(options)?)
+        && check_grids((&first, &further)).is_ok()
     {
-        return sample(&path.display().to_string(), &*store, bytes);
+        return sample_of_channels((&first, &further), bytes);
     }
     let mut coarse = scene.clone();
     for (number, levels) in open {

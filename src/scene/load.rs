@@ -1,12 +1,16 @@
 //! Loading the volumes of a scene's channels.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
+
+use glam::DVec3;
 
 use super::{Channel, Scene, VolumeSource};
 use crate::appearance::{Preset, categories};
 use crate::volume::{
-    self, Access, AdaptedStore, Labels, Resampling, Selection, Store, Volume, VolumeError, builtin, raw_store,
+    self, Access, AdaptedStore, Labels, Resampling, Selection, Store, StreamedChannel, StreamedLevel, Volume,
+    VolumeError, builtin, raw_store,
 };
 
 /// The scene's volume with all channels, on the first one's grid.
@@ -18,11 +22,11 @@ pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeE
     if scene.further.iter().all(is_own) {
         return Ok(volume);
     }
-    single(&volume, 0, &first)?;
+    single(volume.channels().count(), 0, &first)?;
     let further = (1..).zip(&scene.further).map(|(number, settings)| {
         let key = format!("channel[{number}].volume");
         let own = channel(settings, &key, access)?;
-        single(&own, number, settings)?;
+        single(own.channels().count(), number, settings)?;
         let resampling = if has_labels_for_values(settings, &own) { Resampling::Nearest } else { Resampling::Linear };
         own.onto(&volume, resampling, (&key, Path::new(&origin(&settings.volume))), access)
     });
@@ -49,9 +53,64 @@ pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Sto
         VolumeSource::Raw(path, layout) => raw_store(path, layout, &access),
         VolumeSource::Builtin(_) | VolumeSource::Memory => return None,
     };
-    let Some(spacing) = first.spacing else { return Some(store) };
-    let spaced = |store| Ok(Arc::new(AdaptedStore::spaced(&origin(&first.volume), store, spacing)?) as Arc<dyn Store>);
-    Some(store.and_then(spaced))
+    Some(store.and_then(|store| spaced(&origin(&first.volume), store, first.spacing)))
+}
+
+/// A scene's channels to be read by boxes: the first one, and those after it.
+pub(super) type Streamed = (StreamedChannel, Vec<StreamedChannel>);
+
+/// The channels that a scene names, or all of the only file that it names, to be read by boxes; `None` if one of them comes from no file.
+///
+/// # Errors
+/// If a file cannot be read by boxes, lacks what is selected, or holds several channels where several channels name volumes.
+pub(super) fn streamed(scene: &Scene, access: &Access) -> Option<Result<Streamed, VolumeError>> {
+    let is_own = |channel: &Channel| channel.volume == VolumeSource::Memory;
+    let named = if scene.further.iter().all(is_own) { 1 } else { 1 + scene.further.len() };
+    let named: Vec<Cow<Channel>> = scene.channels().take(named).collect();
+    let is_file = |channel: &Cow<Channel>| matches!(channel.volume, VolumeSource::File(_) | VolumeSource::Raw(..));
+    let (first, further) = named.split_first()?;
+    named.iter().all(is_file).then(|| {
+        let (channel, own) = streamed_file(first, access)?;
+        if further.is_empty() {
+            return Ok((channel, own));
+        }
+        single(1 + own.len(), 0, first)?;
+        let others = (1..).zip(further).map(|(number, settings)| {
+            let (channel, own) = streamed_file(settings, access)?;
+            single(1 + own.len(), number, settings)?;
+            Ok(channel)
+        });
+        Ok((channel, others.collect::<Result<_, VolumeError>>()?))
+    })
+}
+
+/// The selected channels of a file, the first of them with the labels of its settings.
+fn streamed_file(settings: &Channel, access: &Access) -> Result<Streamed, VolumeError> {
+    let level = settings.level.unwrap_or(0);
+    let own = access.selecting(Selection { channel: settings.index, time: settings.time, level: None });
+    let stores = match &settings.volume {
+        VolumeSource::File(path) => volume::stores(path, &own)?,
+        VolumeSource::Raw(path, layout) => vec![raw_store(path, layout, &own)?],
+        VolumeSource::Builtin(_) | VolumeSource::Memory => return Err(in_memory("volume")),
+    };
+    let streamed = |origin: String, store| {
+        let store = spaced(&origin, store, settings.spacing)?;
+        Ok(StreamedLevel::new(origin, store, level as usize))
+    };
+    let mut channels = stores.into_iter().map(|store| streamed(origin(&settings.volume), store).map(Into::into));
+    let first: StreamedChannel = channels.next().unwrap_or_else(|| Err(in_memory("volume")))?;
+    let further = channels.collect::<Result<_, VolumeError>>()?;
+    let Some(path) = &settings.labels else { return Ok((first, further)) };
+    let labels = volume::store(path, &access.whole_at(level))?;
+    Ok((first.with_labels(streamed(path.display().to_string(), labels)?)?, further))
+}
+
+/// A store with the spacing that a scene states, if it states one.
+fn spaced(origin: &str, store: Arc<dyn Store>, spacing: Option<DVec3>) -> Result<Arc<dyn Store>, VolumeError> {
+    match spacing {
+        Some(spacing) => Ok(Arc::new(AdaptedStore::spaced(origin, store, spacing)?)),
+        None => Ok(store),
+    }
 }
 
 /// Where a volume comes from, for errors.
@@ -64,10 +123,10 @@ pub(super) fn origin(source: &VolumeSource) -> String {
 }
 
 /// Checks that one channel's volume is one channel.
-fn single(volume: &Volume, number: usize, settings: &Channel) -> Result<(), VolumeError> {
-    match volume.channels().count() {
+fn single(count: usize, number: usize, settings: &Channel) -> Result<(), VolumeError> {
+    match count {
         1 => Ok(()),
-        count => Err(VolumeError::Invalid {
+        _ => Err(VolumeError::Invalid {
             origin: origin(&settings.volume),
             field: format!("channel[{number}].volume"),
             found: format!("a volume of {count} channels"),

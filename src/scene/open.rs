@@ -1,14 +1,16 @@
 //! Opening a scene's volume: in memory, or where it fits into none, to be read while it is drawn.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
+
+use glam::UVec3;
 
 use super::names::{METHODS, name_of};
 use super::{Scene, load};
 use crate::error::setting::SettingError;
 use crate::parallel;
 use crate::settings::splatting::{Classification, Interpolation, Method, Splatting};
-use crate::volume::{Access, Grid, IndexedStore, ReadOptions, Store, StoreIndex, StreamedVolume, Volume, VolumeError};
+use crate::volume::{Access, Grid, ReadOptions, StoreIndex, StreamedLevel, StreamedVolume, Volume, VolumeError};
 
 /// A volume that can be drawn.
 #[derive(Clone, Debug)]
@@ -32,7 +34,7 @@ impl OpenVolume {
     pub fn level(&self) -> u32 {
         match self {
             Self::Whole(volume) => volume.level(),
-            Self::Streamed(volume) => volume.level as u32,
+            Self::Streamed(volume) => volume.level() as u32,
         }
     }
 
@@ -88,22 +90,29 @@ impl Scene {
         Ok((volume.into(), access.files()))
     }
 
-    /// Checks that the scene can show a volume that is read while it is drawn, given its sample: one channel of values, with image-aligned sheets, and values that
-    /// are interpolated as they are.
-    pub(crate) fn check_streamed(&self, sample: &Volume) -> Result<(), SettingError> {
+    /// Checks that the scene can show a volume that is read while it is drawn: values without colours of their own, with image-aligned sheets, and interpolated as
+    /// they are. The sample must have the volume's channels and labels.
+    pub(crate) fn check_streamed(&self, volume: &StreamedVolume) -> Result<(), SettingError> {
         let refused = |key: &str, found: &str, allowed: &str| {
             let found = format!("{found} for a volume that is streamed");
             Err(SettingError::new(key, found, format!("{allowed}, or more memory")))
         };
-        let of_volume = match sample {
-            _ if !self.further.is_empty() || !sample.further().is_empty() => Some("several channels"),
-            _ if sample.labels().is_some() => Some("labels"),
-            _ if sample.colors().is_some() => Some("colours"),
-            _ => None,
-        };
-        if let Some(found) = of_volume {
-            let found = format!("{found} of a volume that is streamed");
-            return Err(SettingError::new("volume", found, "one channel of values without labels, or more memory"));
+        let sample = &volume.sample;
+        if sample.channels().any(|channel| channel.colors().is_some()) {
+            return refused("volume", "colours", "values");
+        }
+        let of_stores: Vec<bool> = volume.channels().map(|channel| channel.labels.is_some()).collect();
+        let of_sample: Vec<bool> = sample.channels().map(|channel| channel.labels().is_some()).collect();
+        if of_stores != of_sample {
+            let [found, allowed] = [of_sample, of_stores].map(|labelled| {
+                let count = labelled.iter().filter(|is_labelled| **is_labelled).count();
+                format!("{} channels, {count} of them with labels", labelled.len())
+            });
+            return Err(SettingError::new(
+                "volume",
+                format!("a sample of {found}"),
+                format!("{allowed}, as the stores have"),
+            ));
         }
         let Splatting { interpolation, method, .. } = self.splatting;
         if (self.classification(sample), interpolation) == (Classification::After, Interpolation::Exact) {
@@ -117,29 +126,34 @@ impl Scene {
     }
 }
 
-/// The scene's volume, if it has one channel, can be read by boxes, and fits into no memory; `None` for any other. A file that cannot be opened gives
+/// The scene's volume, if its channels and labels can be read by boxes, and fit into no memory; `None` for any other. A file that cannot be opened gives
 /// `None` too: reading it as a whole then tells why.
+///
+/// # Errors
+/// If channels or labels lie on several grids, the index is of none of them, or their sample cannot be read.
 fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Option<StreamedVolume>, VolumeError> {
     let memory = options.memory_limit();
-    let Some(Ok(store)) = load::store(scene, access) else { return Ok(None) };
-    let level = scene.level.unwrap_or(0) as usize;
-    let Some(of) = store.levels().get(level) else { return Ok(None) };
-    let bytes = |dims: [u32; 3]| dims.into_iter().fold(4, |bytes: u64, n| bytes.saturating_mul(n.into()));
+    let Some(Ok((mut first, mut further))) = load::streamed(scene, access) else { return Ok(None) };
+    let (mut bytes, mut largest) = (0, 0_u64);
+    let of_voxels =
+        |dims: UVec3, each: u64| dims.to_array().into_iter().fold(each, |all, n| all.saturating_mul(n.into()));
+    for channel in std::iter::once(&first).chain(&further) {
+        for (of, each) in [(Some(&channel.values), 4), (channel.labels.as_ref(), 2)] {
+            let Some(StreamedLevel { store, level, .. }) = of else { continue };
+            let Some(of) = store.levels().get(*level) else { return Ok(None) };
+            bytes = of_voxels(of.grid.dims, each).saturating_add(bytes);
+            largest = largest.max(of_voxels(of.chunk, 4));
+        }
+    }
     // Every thread that draws or reads holds some chunks, beside those that wait for other tiles.
-    let least = bytes(of.chunk.to_array()).saturating_mul(4 * parallel::current_num_threads() as u64);
-    if bytes(of.grid.dims.to_array()) <= memory || least > memory / 2 {
+    let least = largest.saturating_mul(4 * parallel::current_num_threads() as u64);
+    if bytes <= memory || least > memory / 2 {
         return Ok(None);
     }
-    let store = match &options.index {
-        Some(path) => indexed(store, path, access)?,
-        None => store,
-    };
-    StreamedVolume::new(&load::origin(&scene.volume), store, level, memory).map(Some)
-}
-
-/// A store with the index in a file.
-fn indexed(store: Arc<dyn Store>, path: &Path, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
-    let text = access.text(path)?.map_err(|source| VolumeError::Io { path: path.to_owned(), source })?;
-    let origin = path.display().to_string();
-    Ok(Arc::new(IndexedStore::new(store, StoreIndex::decode(&origin, &text)?, &origin)?))
+    if let Some(path) = &options.index {
+        let text = access.text(path)?.map_err(|source| VolumeError::Io { path: path.clone(), source })?;
+        let origin = path.display().to_string();
+        StreamedVolume::index((&mut first, &mut further), StoreIndex::decode(&origin, &text)?, &origin)?;
+    }
+    StreamedVolume::of_channels(first, further, memory).map(Some)
 }

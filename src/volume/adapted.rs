@@ -37,28 +37,40 @@ impl AdaptedStore {
     }
 
     /// A store that tells of the chunks of one level that are read, each once.
-    pub(super) fn watched(store: Arc<dyn Store>, level: usize, progress: Arc<ChunkProgress>) -> Self {
+    pub(super) fn watched(store: Arc<dyn Store>, level: usize, tally: &Arc<Tally>) -> Self {
         let levels = store.levels().to_vec();
-        let watch = Watch::new(level, levels[level].chunks(), progress);
+        let watch = Watch::new(level, levels[level].chunks(), tally);
         Self { store, levels, watch: Some(watch) }
+    }
+}
+
+/// The number of chunks that have been read of one store or of several.
+pub(super) struct Tally {
+    total: u64,
+    count: AtomicU64,
+    progress: Arc<ChunkProgress>,
+}
+
+impl Tally {
+    /// `total` is the number of all chunks.
+    pub(super) fn new(total: u64, progress: Arc<ChunkProgress>) -> Self {
+        Self { total, count: AtomicU64::new(0), progress }
     }
 }
 
 /// The chunks of a level that have been read.
 struct Watch {
     level: usize,
-    total: u64,
     /// A bit for every chunk: whether any of its voxels has been read.
     read: Vec<AtomicU64>,
-    count: AtomicU64,
-    progress: Arc<ChunkProgress>,
+    tally: Arc<Tally>,
 }
 
 impl Watch {
-    fn new(level: usize, chunks: UVec3, progress: Arc<ChunkProgress>) -> Self {
+    fn new(level: usize, chunks: UVec3, tally: &Arc<Tally>) -> Self {
         let total = chunks.as_u64vec3().element_product();
         let read = (0..total.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
-        Self { level, total, read, count: AtomicU64::new(0), progress }
+        Self { level, read, tally: Arc::clone(tally) }
     }
 
     /// Notes that a box of the level has been read.
@@ -69,7 +81,8 @@ impl Watch {
                 let number = u64::from(x) + across.x * (u64::from(y) + across.y * u64::from(z));
                 let bit = 1 << (number % 64);
                 if self.read[(number / 64) as usize].fetch_or(bit, Ordering::Relaxed) & bit == 0 {
-                    (self.progress)(self.count.fetch_add(1, Ordering::Relaxed) + 1, self.total);
+                    let Tally { total, count, progress } = &*self.tally;
+                    progress(count.fetch_add(1, Ordering::Relaxed) + 1, *total);
                 }
             }
         }
@@ -78,7 +91,7 @@ impl Watch {
 
 impl Debug for Watch {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Watch").field("level", &self.level).field("total", &self.total).finish_non_exhaustive()
+        f.debug_struct("Watch").field("level", &self.level).finish_non_exhaustive()
     }
 }
 

@@ -169,18 +169,18 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     Err(invalid(path, "format", found, allowed))
 }
 
-/// Opens a file that is read by boxes.
-pub(super) fn open_store(path: &Path, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
+/// Opens the selected channels of a file that is read by boxes.
+pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
     let formats = formats::<f32>();
     let found = match format_at(&formats, path, access)? {
         #[cfg(feature = "zarr")]
-        Some(Format { name: ZARR, .. }) => return Ok(Arc::new(super::zarr::open(path, ZARR, access)?)),
+        Some(Format { name: ZARR, .. }) => return super::zarr::open(path, ZARR, access),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         Some(Format { name, read: Ok(read), .. }) if SEEKABLE.contains(name) => {
             let (noting, notes) = access.noting();
             let loaded = read(path, &noting)?;
             let notes = notes.lock().unwrap_or_else(PoisonError::into_inner);
-            return Ok(Arc::new(FileStore::of_header(path, (name, &loaded), &notes, access)?));
+            return FileStore::of_header(path, (name, &loaded), &notes, access);
         }
         Some(Format { name, .. }) => (*name).to_owned(),
         None => "another".to_owned(),

@@ -97,6 +97,11 @@ impl StoreIndex {
         Ok(Self { identity: identity.to_owned(), levels })
     }
 
+    /// Whether the index is of a store.
+    pub(super) fn is_of(&self, store: &dyn Store) -> bool {
+        self.identity == store.identity()
+    }
+
     /// The range of all values of a level; `None` if all are holes.
     fn range(&self, level: usize) -> Option<[f32; 2]> {
         let all = self.levels.get(level)?.ranges.iter().copied().fold(EMPTY, union);

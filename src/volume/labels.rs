@@ -9,7 +9,8 @@ use glam::{DVec3, UVec3};
 use super::access::{Access, ReadOptions};
 use super::format;
 use super::loaded::Loaded;
-use super::{Volume, VolumeError, invalid};
+use super::samples::Voxel;
+use super::{Grid, Volume, VolumeError, invalid};
 
 /// Spacings whose relative difference is less than this count as equal.
 const SAME_SPACING: f64 = 1e-4;
@@ -53,6 +54,24 @@ impl Labels {
         let Loaded { dims, spacing, label_names: names, values, .. } = loaded;
         Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
     }
+}
+
+/// The labels among values: of every `step`th voxel along each axis of a file, from voxel `from` on.
+///
+/// # Errors
+/// If a value is no label; the error names the file and the voxel.
+pub(crate) fn labels_of(
+    origin: &str,
+    (from, dims, step): (UVec3, UVec3, u32),
+    values: &[f32],
+) -> Result<Arc<[u16]>, VolumeError> {
+    let label = |(index, &value): (u32, &f32)| {
+        u16::of(value).ok_or_else(|| {
+            let voxel = from + step * Grid::new(dims, DVec3::ONE).voxel_at(index);
+            invalid(origin, "data", format!("{value} at voxel {voxel}"), u16::ALLOWED.to_owned())
+        })
+    };
+    (0..).zip(values).map(label).collect()
 }
 
 impl Volume {

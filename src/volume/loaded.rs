@@ -75,11 +75,12 @@ impl<T> Loaded<T> {
 
     /// What the file, of some format, states about one of its channels.
     pub(super) fn facts(&self, format: &'static str, channel: usize) -> StoreFacts {
-        let Self { series, unit, orientation, palette, label_names, .. } = self;
+        let Self { series, spacing, unit, orientation, palette, label_names, .. } = self;
         let channels = if series.is_color { 1 } else { series.channels };
         let display = self.displays.get(channel).filter(|display| **display != ChannelDisplay::default());
         StoreFacts {
             encoding: Some(Encoding { format, sample_type: self.kind, channels, times: series.times }),
+            spacing: *spacing,
             unit: unit.clone(),
             orientation: *orientation,
             palette: palette.clone(),

@@ -76,6 +76,7 @@ pub use grid::Grid;
 pub(crate) use grid::{SPACING, check_spacing};
 pub use index::{IndexedStore, StoreIndex};
 pub use labels::Labels;
+pub(crate) use labels::labels_of;
 use loaded::{Levels, Loaded};
 pub use orientation::{Orientation, PatientSide};
 pub use raw::RawLayout;
@@ -84,9 +85,11 @@ pub use sample::sample;
 pub use samples::SampleType;
 pub(crate) use samples::{SIZES, dims_of};
 pub(crate) use series::Selection;
+use store::facts_of_channel;
 pub use store::{Store, StoreFacts, StoreLevel, open_raw_store, open_store};
-pub(crate) use store::{raw_store, store};
-pub use streamed::StreamedVolume;
+pub(crate) use store::{raw_store, store, stores};
+pub use streamed::{StreamedChannel, StreamedLevel, StreamedVolume};
+pub(crate) use streamed::{check_grids, sample_of_channels};
 
 use crate::error::setting::SettingError;
 pub use crate::error::volume::VolumeError;
@@ -247,7 +250,8 @@ impl Volume {
         let (format, loaded) = format::read(path, access)?;
         let first_channel = access.selection().channel.unwrap_or(0) as usize;
         let channels = first_channel..(loaded.series.channels as usize).max(first_channel + 1);
-        let facts: Vec<StoreFacts> = channels.map(|channel| loaded.facts(format, channel)).collect();
+        let facts: Vec<StoreFacts> =
+            channels.enumerate().map(|(at, channel)| facts_of_channel(loaded.facts(format, channel), at)).collect();
         let mut facts = facts.into_iter();
         let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();
@@ -268,13 +272,7 @@ impl Volume {
             Self::new(&origin, dims, spacing, values)?.stating(&origin, facts.next().unwrap_or_default())
         };
         let mut first = channel(values)?;
-        // What concerns all channels is the first one's.
-        let further = further
-            .into_iter()
-            .rev()
-            .map(channel)
-            .map(|channel| Ok(Self { palette: None, label_names: BTreeMap::new(), orientation: None, ..channel? }));
-        let further = further.collect::<Result<_, VolumeError>>()?;
+        let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
         if let Some(Levels { dims, level, grid, reads }) = levels {
             grid.check().map_err(|error| refused(&origin, error))?;
             (first.grid, first.levels, first.level, first.reads) = (grid, dims, level, Some(reads));
@@ -284,7 +282,7 @@ impl Volume {
 
     /// The same volume with what its file states beside its grid and values.
     fn stating(self, origin: &str, facts: StoreFacts) -> Result<Self, VolumeError> {
-        let StoreFacts { encoding, unit, orientation, palette, label_names, channel_name, display } = facts;
+        let StoreFacts { encoding, spacing: _, unit, orientation, palette, label_names, channel_name, display } = facts;
         Self { encoding, unit, palette, label_names, channel_name, display, ..self }
             .with_orientation(origin, orientation)
     }

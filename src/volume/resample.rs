@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3};
 
 use super::access::Access;
-use super::{Orientation, Texel, Volume, VolumeError, invalid};
+use super::{Grid, Orientation, Texel, Volume, VolumeError, invalid};
 use crate::parallel::prelude::*;
 
 /// Places that differ by less, in voxels, are the same.
@@ -21,6 +21,9 @@ pub(crate) enum Resampling {
     Nearest,
 }
 
+/// A grid, and how it lies in the patient, if its file states it.
+pub(super) type Oriented<'a> = (&'a Grid, Option<&'a Orientation>);
+
 /// The map from voxels of one grid to those of another along each axis of the first.
 struct Placement {
     origin: DVec3,
@@ -29,21 +32,21 @@ struct Placement {
 
 impl Placement {
     /// In the files' own space, or where either has none, with their centres and axes in one place.
-    fn new(from: &Volume, to: &Volume) -> Self {
-        let steps = |axes: glam::DMat3| [0, 1, 2].map(|axis| axes.col(axis) * from.spacing()[axis]);
-        match (from.orientation(), to.orientation()) {
+    fn new((from, of_from): Oriented, (to, of_to): Oriented) -> Self {
+        let steps = |axes: glam::DMat3| [0, 1, 2].map(|axis| axes.col(axis) * from.spacing[axis]);
+        match (of_from, of_to) {
             (Some(first), Some(second)) => {
                 // The axes are orthonormal, so the transpose is the inverse.
-                let into = |vector: DVec3| (second.axes.transpose() * vector) / to.spacing();
+                let into = |vector: DVec3| (second.axes.transpose() * vector) / to.spacing;
                 Self { origin: into(first.origin - second.origin), steps: steps(first.axes).map(into) }
             }
             _ => {
-                let steps = steps(glam::DMat3::IDENTITY).map(|step| step / to.spacing());
-                let center = from.grid().center();
+                let steps = steps(glam::DMat3::IDENTITY).map(|step| step / to.spacing);
+                let center = from.center();
                 let offset: DVec3 = (0..3).map(|axis| steps[axis] * center[axis]).sum();
                 // The centres of coarser levels need not lie in one place.
-                let apart = (from.grid().place() - to.grid().place()) / to.spacing();
-                Self { origin: to.grid().center() - offset + apart, steps }
+                let apart = (from.place() - to.place()) / to.spacing;
+                Self { origin: to.center() - offset + apart, steps }
             }
         }
     }
@@ -59,6 +62,12 @@ impl Placement {
     }
 }
 
+/// Whether the voxels of two grids lie on one another.
+pub(super) fn is_same_grid(one: Oriented, other: Oriented) -> bool {
+    let last = other.0.dims.as_dvec3() - 1.0;
+    one.0.dims == other.0.dims && Placement::new(one, other).is_identity(last)
+}
+
 impl Volume {
     /// The volume on another one's grid: values as stated, labels by the nearest one. A voxel beyond the centres of this volume's voxels, or beside
     /// a hole, becomes a hole. `key` and `origin` name the volume in errors and in the warning that says that it was resampled.
@@ -69,11 +78,12 @@ impl Volume {
         (key, origin): (&str, &Path),
         access: &Access,
     ) -> Result<Self, VolumeError> {
-        let placement = Placement::new(grid, &self);
-        let (dims, own_last) = (grid.dims(), self.dims().as_dvec3() - 1.0);
-        if dims == self.dims() && placement.is_identity(own_last) {
+        let places = [grid, &self].map(|volume| (volume.grid(), volume.orientation()));
+        if is_same_grid(places[0], places[1]) {
             return Ok(self);
         }
+        let placement = Placement::new(places[0], places[1]);
+        let (dims, own_last) = (grid.dims(), self.dims().as_dvec3() - 1.0);
         let count = dims.element_product();
         let optional = |is_there: bool, bytes| if is_there { bytes } else { 0 };
         let of_voxel = 4 + optional(self.labels().is_some(), 2) + optional(self.colors().is_some(), 8);

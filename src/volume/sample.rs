@@ -18,15 +18,27 @@ const MOST_CHUNKS: u64 = 1000;
 /// # Errors
 /// If the store cannot be read, or holds no finite value there.
 pub fn sample(origin: &str, store: &dyn Store, memory: u64) -> Result<Volume, VolumeError> {
-    let levels = store.levels();
+    let grids: Vec<Grid> = store.levels().iter().map(|level| level.grid).collect();
+    let (number, step) = spread(&grids, memory);
+    sample_at(origin, store, (number, step))
+}
+
+/// Of some levels, from the finest, the number of the one that a sample of at most `memory` bytes is taken of, and the sample's step in voxels.
+pub(super) fn spread(grids: &[Grid], memory: u64) -> (usize, u32) {
     let values_of = |dims: UVec3| dims.to_array().map(u64::from).iter().product::<u64>();
     let fits = |dims: UVec3| values_of(dims).saturating_mul(size_of::<f32>() as u64) <= memory;
-    let number = levels.iter().position(|level| fits(level.grid.dims)).unwrap_or(levels.len() - 1);
+    let number = grids.iter().position(|grid| fits(grid.dims)).unwrap_or(grids.len() - 1);
+    let dims = grids[number].dims;
+    let longest = dims.max_element();
+    let fits_by = |step: u32| fits(dims.map(|count| count.div_ceil(step)));
+    (number, (1..longest).find(|&step| fits_by(step)).unwrap_or(longest))
+}
+
+/// Every `step`th voxel of a level along each axis.
+pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize, u32)) -> Result<Volume, VolumeError> {
+    let levels = store.levels();
     let level = &levels[number];
-    let of_step = |step: u32| level.grid.dims.map(|count| count.div_ceil(step));
-    let longest = level.grid.dims.max_element();
-    let step = (1..longest).find(|&step| fits(of_step(step))).unwrap_or(longest);
-    let dims = of_step(step);
+    let dims = level.grid.dims.map(|count| count.div_ceil(step));
     let mut values = vec![0.0; dims.element_product() as usize];
     let (pieces, reads) = pieces(store, number, level, step)?;
     for Piece { from, dims: piece_dims, values: piece } in pieces {

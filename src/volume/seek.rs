@@ -2,7 +2,7 @@
 
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use glam::{DVec3, UVec3};
 
@@ -11,7 +11,7 @@ use super::loaded::Loaded;
 use super::samples::Samples;
 use super::series::{Series, SeriesOrder};
 use super::source::{invalid, io_error};
-use super::store::{Store, StoreLevel, check_box, check_chunk};
+use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
 use super::{Grid, StoreFacts, VolumeError};
 
 /// The sizes of a chunk, unless the volume is smaller: any box can be read, so these only divide it into parts of a convenient size.
@@ -48,44 +48,48 @@ pub(super) struct FileStore {
 }
 
 impl FileStore {
-    /// The store of a file whose header was read, of which `notes` tells where the samples are.
+    /// The stores of the selected channels of a file whose header was read, of which `notes` tells where the samples are.
     pub(super) fn of_header(
         path: &Path,
         (format, loaded): (&'static str, &Loaded<f32>),
         notes: &[Located],
         access: &Access,
-    ) -> Result<Self, VolumeError> {
-        let facts = loaded.facts(format, access.selection().channel.unwrap_or(0) as usize);
-        match notes {
-            [located] => Self::new(located.clone(), loaded.spacing.unwrap_or(DVec3::ONE), facts, access),
-            _ => {
-                let found = format!("{} places", notes.len());
-                Err(invalid(path, "data", found, "one stretch of uncompressed samples, x fastest"))
-            }
+    ) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
+        let [located] = notes else {
+            let found = format!("{} places", notes.len());
+            return Err(invalid(path, "data", found, "one stretch of uncompressed samples, x fastest"));
+        };
+        let series = &located.series;
+        series.check(path, access.selection())?;
+        if series.is_color {
+            return Err(invalid(path, "channels", "colours", "channels of values, for what is read by boxes"));
         }
+        let store = |(at, channel): (usize, u32)| {
+            let facts = facts_of_channel(loaded.facts(format, channel as usize), at);
+            let spacing = loaded.spacing.unwrap_or(DVec3::ONE);
+            Ok(Arc::new(Self::new(located.clone(), channel, spacing, facts, access)?) as Arc<dyn Store>)
+        };
+        series.channels(access.selection()).enumerate().map(store).collect()
     }
+
+    /// One channel of a file.
 
     pub(super) fn new(
         located: Located,
+        channel: u32,
         spacing: DVec3,
         facts: StoreFacts,
         access: &Access,
     ) -> Result<Self, VolumeError> {
-        let Located { path, samples, series, .. } = &located;
+        let Located { samples, series, .. } = &located;
         let selection = access.selection();
-        series.check(path, selection)?;
-        let channels = series.channels(selection);
-        if channels.len() > 1 || series.is_color {
-            let allowed = format!("the number of one of them, 0 to {}, and no colours", series.channels - 1);
-            return Err(invalid(path, "channels", series.channels, allowed));
-        }
         let (count, time) = (u64::from(samples.count()), u64::from(selection.time.unwrap_or(0)));
         let (step, first) = match series.order {
             SeriesOrder::Interleaved => {
                 let channels = u64::from(series.channels);
-                (channels, time * channels * count + u64::from(selection.channel.unwrap_or(0)))
+                (channels, time * channels * count + u64::from(channel))
             }
-            _ => (1, series.block(channels.start, selection) * count),
+            _ => (1, series.block(channel, selection) * count),
         };
         let level = StoreLevel { grid: Grid::new(samples.dims, spacing), chunk: samples.dims.min(UVec3::splat(CHUNK)) };
         let mut store = Self {

@@ -66,6 +66,8 @@ pub trait Store: Send + Sync + Debug {
 pub struct StoreFacts {
     /// How the values are stored.
     pub encoding: Option<Encoding>,
+    /// The distance between the finest level's voxels in world units, if the file states it.
+    pub spacing: Option<DVec3>,
     /// The name of the world unit.
     pub unit: Option<String>,
     /// How the volume lies in the patient.
@@ -107,7 +109,27 @@ pub fn open_store(path: &Path, options: &ReadOptions) -> Result<Arc<dyn Store>, 
 
 /// As [`open_store`].
 pub(crate) fn store(path: &Path, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
-    format::open_store(path, access)
+    let mut stores = stores(path, access)?;
+    match (stores.len(), stores.pop()) {
+        (1, Some(store)) => Ok(store),
+        (count, _) => {
+            let allowed = format!("the number of one of them, 0 to {}", count.saturating_sub(1));
+            Err(invalid(path, "channels", count, allowed))
+        }
+    }
+}
+
+/// Opens the channels of a volume that are selected, each to be read by boxes; otherwise as [`open_store`].
+pub(crate) fn stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
+    format::open_stores(path, access)
+}
+
+/// What a file states about one of its channels, given its number among those that are read: what concerns all of them is the first one's.
+pub(super) fn facts_of_channel(facts: StoreFacts, number: usize) -> StoreFacts {
+    match number {
+        0 => facts,
+        _ => StoreFacts { palette: None, label_names: BTreeMap::new(), orientation: None, ..facts },
+    }
 }
 
 /// Opens a file of samples without a header to be read by boxes.
@@ -132,7 +154,8 @@ pub(crate) fn raw_store(path: &Path, layout: &RawLayout, access: &Access) -> Res
     let located = Located { path: path.to_owned(), at, samples, series: Series::default() };
     let encoding = Encoding { format: raw::FORMAT, sample_type: kind, channels: 1, times: 1 };
     let facts = StoreFacts { encoding: Some(encoding), ..StoreFacts::default() };
-    Ok(Arc::new(FileStore::new(located, DVec3::ONE, facts, access)?))
+    located.series.check(path, access.selection())?;
+    Ok(Arc::new(FileStore::new(located, 0, DVec3::ONE, facts, access)?))
 }
 
 /// Checks that a box lies in a level, and that there is a value for each of its voxels.

@@ -1,5 +1,7 @@
 //! Volumes that are larger than `--memory`.
 
+use std::fs;
+
 use serde_json::{Value, json};
 
 use crate::*;
@@ -135,6 +137,175 @@ fn everything_is_drawn_of_a_volume_larger_than_memory() {
     folder
         .run(&format!("merge {mixed} -o no.npy"))
         .assert_failure(2, &["whole-1.exr: scene: found ", ", as in streamed-0.exr"]);
+}
+
+/// An OME-Zarr image of three channels of 64³ bytes, each a ball in another corner, in chunks of 16³: 3 MiB as numbers of 4 bytes. Chunks of zeros are left out.
+fn write_channels(folder: &Folder) {
+    const SIDE: u32 = 64;
+    let axes =
+        ["c", "z", "y", "x"].map(|name| json!({"name": name, "type": if name == "c" { "channel" } else { "space" }}));
+    let dataset = json!({"path": "0", "coordinateTransformations": [{"type": "scale", "scale": [1, 1, 1, 1]}]});
+    let group = json!({"zarr_format": 3, "node_type": "group", "attributes": {"ome": {
+        "version": "0.5", "multiscales": [{"axes": axes, "datasets": [dataset]}],
+    }}});
+    let array = json!({
+        "zarr_format": 3, "node_type": "array", "shape": [3, SIDE, SIDE, SIDE], "data_type": "uint8", "fill_value": 0,
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [1, 16, 16, 16]}},
+        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}}, "codecs": [{"name": "bytes"}],
+    });
+    fs::create_dir_all(folder.path("three.zarr/0")).unwrap();
+    folder.write("three.zarr/zarr.json", group.to_string());
+    folder.write("three.zarr/0/zarr.json", array.to_string());
+    for (channel, chunk) in (0..3).flat_map(|channel| (0..64).map(move |chunk: u32| (channel, chunk))) {
+        let low = [chunk % 4, chunk / 4 % 4, chunk / 16].map(|at| 16 * at);
+        let value = |index: u32| ball(channel, [index % 16 + low[0], index / 16 % 16 + low[1], index / 256 + low[2]]);
+        let bytes: Vec<u8> = (0..16 * 16 * 16).map(|index| value(index) as u8).collect();
+        if bytes.iter().any(|&byte| byte > 0) {
+            let path =
+                folder.path(&format!("three.zarr/0/c/{channel}/{}/{}/{}", low[2] / 16, low[1] / 16, low[0] / 16));
+            fs::create_dir_all(path.parent().unwrap()).unwrap();
+            fs::write(path, bytes).unwrap();
+        }
+    }
+}
+
+/// The value at a voxel of a ball among 64³ voxels, in a corner for each of three channels.
+fn ball(channel: u32, voxel: [u32; 3]) -> f32 {
+    let center = [[24.0, 26.0, 25.0], [40.0, 30.0, 28.0], [30.0, 40.0, 36.0]][channel as usize];
+    let square: f32 = voxel.iter().zip(center).map(|(&at, center): (_, f32)| (at as f32 - center).powi(2)).sum();
+    (15.0 * (18.0 - square.sqrt())).clamp(0.0, 200.0).floor()
+}
+
+/// Asserts that something of several channels is drawn the same with a limit that it does not fit into, and returns the statistics.
+fn assert_streamed_alike(folder: &Folder, what: &str, memory: &str) -> Value {
+    folder.render(&format!("{what} -o whole.npy"));
+    folder
+        .run_with(&ONE_THREAD, "", &format!("render {what} --memory {memory} -o streamed.npy --stats stats.json"))
+        .assert_success();
+    let [whole, streamed] = ["whole.npy", "streamed.npy"].map(|name| folder.read_npy(name).2);
+    assert!(whole.iter().any(|pixel| *pixel != whole[0]), "{what}: nothing shows");
+    let differences = whole.iter().flatten().zip(streamed.iter().flatten()).map(|(a, b)| (a - b).abs());
+    let largest = differences.fold(0.0, f32::max);
+    assert!(largest <= 2e-6, "{what}: {largest:e}");
+    serde_json::from_slice(&folder.read("stats.json")).unwrap()
+}
+
+/// Every thread may hold chunks, so that fewer threads need less memory.
+const ONE_THREAD: [(&str, &str); 1] = [("RAYON_NUM_THREADS", "1")];
+
+/// What all images of several channels have in common.
+const CAMERA: &str = "--set camera={direction=[0.3,1,-0.4],fit=\"volume\"} --set image={width=150,height=130} --set splatting.opacity_threshold=1";
+
+#[test]
+fn channels_of_an_image_larger_than_memory_are_streamed() {
+    let folder = Folder::new();
+    write_channels(&folder);
+    let table = |number: u32, color: &str| {
+        format!("--set channel[{number}].transfer={{opacity=[[0,0],[40,0],[200,0.6]],color=[[0,{color}]]}}")
+    };
+    let look = format!("three.zarr {CAMERA} {} {}", table(0, "[1,0,0]"), table(2, "[0,0.3,1]"));
+    let of = |stats: &Value, key: &str| stats[key].as_u64().unwrap();
+    for backend in ["cpu", "gpu", "reference"] {
+        let shown = format!("{look} {} --backend {backend} --set splatting.classification=before", table(1, "[0,1,0]"));
+        let stats = assert_streamed_alike(&folder, &shown, "2MiB");
+        assert_eq!((of(&stats, "chunks_total"), of(&stats, "voxels_total")), (3 * 64, 64 * 64 * 64), "{backend}");
+        assert!((3..3 * 64).contains(&of(&stats, "chunks_read")), "{backend}: {stats}");
+        assert_eq!(of(&stats, "bytes_read"), of(&stats, "chunks_read") * 16 * 16 * 16, "{backend}");
+        // A hidden channel, and one without opacity.
+        let hidden = format!("{shown} --set channel[0].visible=false --set channel[2].transfer.opacity=[[0,0]]");
+        let fewer = assert_streamed_alike(&folder, &hidden, "2MiB");
+        assert!((1..64).contains(&of(&fewer, "chunks_read")), "{backend}: {fewer}");
+    }
+    // What the image leaves open is chosen for a sample; the channels share no sheets; one channel alone.
+    let after = format!("{look} {} --backend cpu --set splatting.classification=after", table(1, "[0,1,0]"));
+    let stats = assert_streamed_alike(&folder, &after, "2MiB");
+    assert!(of(&stats, "sample_chunks_read") >= 3, "{stats}");
+    assert_streamed_alike(&folder, &format!("{after} --set splatting.compositing=maximum"), "2MiB");
+    let one = format!(
+        "three.zarr {CAMERA} --channel 1 --backend cpu --set transfer={{opacity=[[0,0],[40,0],[200,0.6]],color=[[0,[1,1,1]]]}}"
+    );
+    let stats = assert_streamed_alike(&folder, &one, "900KiB");
+    assert_eq!(of(&stats, "chunks_total"), 64);
+    for preset in ["confocal", "fusion"] {
+        let open = format!("render three.zarr --preset {preset} --memory 2MiB --backend cpu -o open.png");
+        folder.run_with(&ONE_THREAD, "", &open).assert_success();
+    }
+
+    // An index of one channel: nothing is read of it if all of its values are below those that show.
+    folder.run("index three.zarr --channel 1 -o one.index").assert_success();
+    let dim = format!("{after} --set channel[1].transfer.opacity=[[0,0],[210,0],[220,1]]");
+    let plain = assert_streamed_alike(&folder, &dim, "2MiB");
+    let told = assert_streamed_alike(&folder, &format!("{dim} --index one.index"), "2MiB");
+    assert!(of(&told, "chunks_read") < of(&plain, "chunks_read"), "{told} {plain}");
+    folder.run("index three.zarr -o all.index").assert_failure(2, &["three.zarr: channels: found 3, allowed: "]);
+    let run = format!("render {after} --set splatting.compositing=surface --memory 2MiB -o no.png");
+    folder.run_with(&[("RAYON_NUM_THREADS", "2")], "", &run).assert_failure(
+        2,
+        &["splatting.compositing: found \"surface\"", "for several channels of a volume that is streamed"],
+    );
+
+    // Parts, and what tells of the volume.
+    for (at, slabs) in ["-100..0", "0..100"].iter().enumerate() {
+        let part = format!("render {after} --memory 2MiB --slabs {slabs} -o part-{at}.exr");
+        folder.run_with(&ONE_THREAD, "", &part).assert_success();
+    }
+    folder.run("merge part-0.exr part-1.exr -o merged.npy").assert_success();
+    folder.run_with(&ONE_THREAD, "", &format!("render {after} --memory 2MiB -o streamed.npy")).assert_success();
+    let [merged, streamed] = ["merged.npy", "streamed.npy"].map(|name| folder.read_npy(name).2);
+    let differences = merged.iter().flatten().zip(streamed.iter().flatten()).map(|(a, b)| (a - b).abs());
+    assert!(differences.fold(0.0, f32::max) <= 1e-6);
+    let info = folder.run_with(&ONE_THREAD, "", "info three.zarr --json --memory 2MiB");
+    let info: Value = serde_json::from_str(&info.stdout).unwrap();
+    assert_eq!((info["channels"].clone(), info["dims"].clone()), (json!(3), json!([64, 64, 64])), "{info}");
+}
+
+/// Channels of several files, one of them segmented.
+#[test]
+fn channels_of_several_files_larger_than_memory_are_streamed() {
+    let folder = Folder::new();
+    // 4.4 MiB as numbers of 4 bytes, and half of it as labels.
+    let dims = [112_u32, 104, 100];
+    let header = |kind: &str, [x, y, z]: [u32; 3]| {
+        format!("NRRD0004\ntype: {kind}\ndimension: 3\nsizes: {x} {y} {z}\nspacings: 1 1 2\nencoding: raw\n\n")
+    };
+    let write = |name: &str, value: &dyn Fn([u32; 3]) -> u8| {
+        let voxels =
+            (0..dims.iter().product()).map(|at| [at % dims[0], at / dims[0] % dims[1], at / dims[0] / dims[1]]);
+        folder.write(name, [header("uchar", dims).into_bytes(), voxels.map(value).collect()].concat());
+    };
+    write("0.nrrd", &|voxel| ball(0, voxel.map(|at| at / 2)) as u8);
+    write("1.nrrd", &|voxel| ball(1, voxel.map(|at| at / 2)) as u8);
+    write("labels.nrrd", &|[x, y, _]| u8::from(x > 60) + 2 * u8::from(y > 60));
+    folder.write("small.nrrd", [header("uchar", [100; 3]).into_bytes(), vec![7; 1_000_000]].concat());
+    let scene = |second: &str, labels: &str| {
+        format!(
+            "camera = {{direction = [0.3, 1, -0.4], fit = 'volume'}}
+            image = {{width = 70, height = 60}}
+            splatting = {{opacity_threshold = 1, classification = 'after'}}
+            [[channel]]
+            volume = {{path = '0.nrrd', labels = '{labels}'}}
+            transfer = {{opacity = [[0, 0], [40, 0], [200, 0.6]], color = [[0, [1, 0, 0]]], label = [
+                {{label = 1, visible = false}}, {{label = 2, color = [[0, [1, 1, 0]]]}}]}}
+            [[channel]]
+            volume = {{path = '{second}'}}
+            transfer = {{opacity = [[0, 0], [40, 0], [200, 0.6]], color = [[0, [0, 1, 0]]]}}\n"
+        )
+    };
+    folder.write("scene.toml", scene("1.nrrd", "labels.nrrd"));
+    let stats = assert_streamed_alike(&folder, "scene.toml --backend cpu", "9MiB");
+    assert_eq!((stats["chunks_total"].clone(), stats["chunks_read"].clone()), (json!(24), json!(24)), "{stats}");
+    let hidden = "scene.toml --backend cpu --set channel[0].visible=false";
+    assert_eq!(assert_streamed_alike(&folder, hidden, "9MiB")["chunks_read"], json!(8));
+
+    folder.write("grids.toml", scene("small.nrrd", "labels.nrrd"));
+    folder.write("sizes.toml", scene("1.nrrd", "small.nrrd"));
+    for (scene, words) in [
+        ("grids.toml", "small.nrrd: channel[1].volume: found a grid of [100, 100, 100] voxels of [1, 1, 2], allowed: "),
+        ("sizes.toml", "small.nrrd: labels: found a grid of [100, 100, 100] voxels of [1, 1, 2], allowed: "),
+    ] {
+        let run = format!("render {scene} --backend cpu --memory 8500KiB -o no.png");
+        folder.run_with(&ONE_THREAD, "", &run).assert_failure(2, &[words, "[112, 104, 100]", "or more memory"]);
+    }
 }
 
 /// A process that streams has no more in memory than its limit, beside what any process of the program has. The C library returns freed memory at once here,

@@ -1,10 +1,10 @@
 //! A volume in memory that is read by boxes.
 
 use std::collections::BTreeSet;
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 
 use glam::UVec3;
-use sheetsplat::volume::{Store, StoreLevel, Volume, VolumeError};
+use sheetsplat::volume::{Store, StoreLevel, StreamedLevel, StreamedVolume, Volume, VolumeError};
 
 /// A volume in memory as a store that notes what is read of it.
 #[derive(Debug)]
@@ -17,12 +17,21 @@ pub(crate) struct MemoryStore {
     pub(crate) broken_from: Option<u32>,
     /// Whether it knows the range of all values.
     pub(crate) is_range_known: bool,
+    /// What identifies it.
+    pub(crate) identity: &'static str,
 }
 
 impl MemoryStore {
     pub(crate) fn new(volume: &Volume, chunk: UVec3) -> Self {
         let levels = [StoreLevel { grid: *volume.grid(), chunk }];
-        Self { volume: volume.clone(), levels, read: Mutex::default(), broken_from: None, is_range_known: true }
+        Self {
+            volume: volume.clone(),
+            levels,
+            read: Mutex::default(),
+            broken_from: None,
+            is_range_known: true,
+            identity: "memory",
+        }
     }
 
     fn value(&self, voxel: UVec3) -> f32 {
@@ -70,6 +79,12 @@ impl Store for MemoryStore {
     }
 
     fn identity(&self) -> String {
-        "memory".to_owned()
+        self.identity.to_owned()
     }
+}
+
+/// A level of a store of one channel, to be streamed with a sample.
+pub(crate) fn streamed(store: Arc<dyn Store>, level: usize, sample: &Volume, memory: u64) -> StreamedVolume {
+    let first = StreamedLevel::new("store", store, level).into();
+    StreamedVolume { first, further: Vec::new(), sample: Arc::new(sample.clone()), memory }
 }

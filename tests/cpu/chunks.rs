@@ -12,7 +12,7 @@ use sheetsplat::scene::VolumeSource;
 use sheetsplat::volume::{IndexedStore, Store, StoreIndex, StreamedVolume, Volume, builtin};
 
 use crate::common::compare::assert_at_most;
-use crate::common::store::MemoryStore;
+use crate::common::store::{self, MemoryStore};
 
 fn head(size: u32) -> Volume {
     let volume = builtin::volume(&format!("head:{size}")).unwrap();
@@ -31,7 +31,7 @@ fn indexed(volume: &Volume, chunk: u32) -> IndexedStore {
 }
 
 fn streamed(store: impl Store + 'static, sample: &Volume) -> StreamedVolume {
-    StreamedVolume { store: Arc::new(store), level: 0, sample: Arc::new(sample.clone()), memory: 1 << 24 }
+    store::streamed(Arc::new(store), 0, sample, 1 << 24)
 }
 
 /// Of an opaque head most chunks with visible values are behind others, or beside what pixels see before they are opaque. Where classification comes after

@@ -8,11 +8,11 @@ use sheetsplat::headless::Rendering;
 use sheetsplat::scene::{Channel, VolumeSource};
 use sheetsplat::settings::{Classification, Compositing, Method, Order, Projection};
 use sheetsplat::stats::Counts;
-use sheetsplat::volume::{SampleType, StreamedVolume, Volume};
+use sheetsplat::volume::{SampleType, Volume};
 use sheetsplat::{Image, Scene};
 
 use crate::after::random_after;
-use crate::common::store::MemoryStore;
+use crate::common::store::{self, MemoryStore};
 use crate::common::{COMPOSITINGS, Random, transfer};
 use crate::{head, random_case, surfaces};
 
@@ -148,9 +148,7 @@ fn threads_change_no_bit_of_a_stream() {
         (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
         scene.camera.projection = projection.unwrap_or(scene.camera.projection);
         let store = Arc::new(MemoryStore::new(&volume, DVec3::splat(8.0).as_uvec3()));
-        let sample = Arc::new(volume.clone());
-        let renderer =
-            StreamRenderer::new(StreamedVolume { store, level: 0, sample, memory: 1 << 30 }, &scene).unwrap();
+        let renderer = StreamRenderer::new(store::streamed(store, 0, &volume, 1 << 30), &scene).unwrap();
         let [one, more @ ..] = THREADS.map(|count| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap();
             bits(&pool.install(|| renderer.draw().unwrap().image))

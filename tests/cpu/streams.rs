@@ -1,6 +1,5 @@
 //! Stores whose chunks are read while they are drawn: the bytes of the volume in memory, from no more than can matter.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
@@ -11,13 +10,14 @@ use sheetsplat::scene::VolumeSource;
 use sheetsplat::settings::{Classification, Region, Window};
 use sheetsplat::stats::StoreCounts;
 use sheetsplat::volume::{
-    Grid, IndexedStore, Labels, Store, StoreIndex, StoreLevel, StreamedVolume, Volume, VolumeError,
+    Grid, IndexedStore, Store, StoreIndex, StoreLevel, StreamedChannel, StreamedLevel, StreamedVolume, Volume,
+    VolumeError,
 };
 use sheetsplat::{Image, RenderError, Scene};
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
-use crate::common::store::MemoryStore;
+use crate::common::store::{self, MemoryStore};
 
 /// A store that holds no chunk.
 #[derive(Debug)]
@@ -65,7 +65,7 @@ fn renderer(
     scene: &Scene,
     memory: u64,
 ) -> Result<StreamRenderer, RenderError> {
-    StreamRenderer::new(StreamedVolume { store, level, sample: Arc::new(sample.clone()), memory }, scene)
+    StreamRenderer::new(store::streamed(store, level, sample, memory), scene)
 }
 
 /// Draws a store and asserts that the image and the work are those of the volume in memory.
@@ -218,16 +218,14 @@ fn failures_are_errors() {
         Arc::new(LargeStore([StoreLevel { grid: Grid::new(UVec3::splat(1024), DVec3::ONE), chunk: UVec3::splat(64) }]));
     let error = renderer(large, 0, &volume, &small, 1 << 24).unwrap().draw().unwrap_err().to_string();
     assert!(error.starts_with("volume.level: found 0, in which 32×32 pixels see a box of voxels of "), "{error}");
-    let labels = Labels {
-        origin: "labels".to_owned(),
-        dims: volume.dims(),
-        spacing: None,
-        values: vec![1; volume.values().len()].into(),
-        names: BTreeMap::new(),
-    };
-    let labelled = volume.clone().with_labels(labels).unwrap();
-    let error = renderer(store.clone(), 0, &labelled, &scene, 1 << 30).unwrap_err().to_string();
-    assert!(error.starts_with("volume: found labels of a volume that is streamed"), "{error}");
+    let labelled = store::streamed(store.clone(), 0, &volume, 1 << 30);
+    let several = StreamedVolume { further: vec![labelled.first.clone()], ..labelled.clone() };
+    let labels = Some(StreamedLevel::new("labels", store.clone(), 0));
+    let first = StreamedChannel { labels, ..labelled.first.clone() };
+    for (volume, found) in [(StreamedVolume { first, ..labelled }, "labels"), (several, "several channels")] {
+        let error = StreamRenderer::new(volume, &scene).unwrap_err().to_string();
+        assert!(error.starts_with(&format!("volume: found {found} of a volume that is streamed")), "{error}");
+    }
     for chunk in [UVec3::ZERO, UVec3::new(1, 0, 1)] {
         let empty = Arc::new(MemoryStore::new(&volume, chunk));
         let error = renderer(empty, 0, &volume, &scene, 1 << 30).unwrap_err().to_string();
@@ -366,7 +364,7 @@ fn headless_views_are_streamed() {
     let scene = scene(&["camera.direction=[0.3,-0.5,0.8]"]);
     let volume = values(&scene);
     let store: Arc<dyn Store> = Arc::new(MemoryStore::new(&volume, UVec3::splat(16)));
-    let streamed = StreamedVolume { store, level: 0, sample: Arc::new(volume.clone()), memory: 1 << 20 };
+    let streamed = store::streamed(store, 0, &volume, 1 << 20);
     let headless = |backend| Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap();
     let cpu = headless(Backend::Cpu);
     let mut view = cpu.view(streamed.clone(), &scene).unwrap();

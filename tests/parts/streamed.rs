@@ -12,7 +12,7 @@ use sheetsplat::volume::{IndexedStore, Store, StoreIndex, StreamedVolume, Volume
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
-use crate::common::store::MemoryStore;
+use crate::common::store::{self, MemoryStore};
 use crate::merging::headless;
 
 /// A scene of a head's values, without its labels.
@@ -31,7 +31,7 @@ fn head(size: u32, sets: &[&str]) -> (Volume, Scene) {
 }
 
 fn streamed(volume: &Volume, store: impl Store + 'static, memory: u64) -> StreamedVolume {
-    StreamedVolume { store: Arc::new(store), level: 0, sample: Arc::new(volume.clone()), memory }
+    store::streamed(Arc::new(store), 0, volume, memory)
 }
 
 /// Draws a volume in boxes of at most 256 KiB and asserts that the image is that of the volume in memory.

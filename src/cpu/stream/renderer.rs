@@ -32,7 +32,7 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
 use crate::volume::range::range_of;
-use crate::volume::{Grid, StoreLevel, StreamedVolume, Volume};
+use crate::volume::{Grid, StoreLevel, StreamedLevel, StreamedVolume, Volume};
 
 /// The minimum number of threads that read: a server, or a disk, answers several requests in the time of one.
 const LEAST_READERS: usize = 8;
@@ -47,6 +47,8 @@ const LEAST_HELD: u64 = 64 << 20;
 #[derive(Clone, Debug)]
 pub struct StreamRenderer {
     volume: StreamedVolume,
+    /// The volume's only values.
+    values: StreamedLevel,
     scene: Scene,
     transfer: TransferFunction,
     /// The minimum and maximum of the sample's values; `None` if all are holes.
@@ -60,19 +62,23 @@ impl StreamRenderer {
     /// the camera's frame, is chosen for the volume's sample.
     ///
     /// # Errors
-    /// If the store has no such level, or its chunks are too many or too large; if the scene has several channels, or the sample has labels, colours or
-    /// several channels; or if a setting is not supported: exact interpolation, and methods other than image-aligned.
+    /// If the store has no such level, or its chunks are too many or too large; if the volume has labels, colours or several channels; or if a setting is not supported: exact interpolation, and methods other than image-aligned.
     pub fn new(volume: StreamedVolume, scene: &Scene) -> Result<Self, RenderError> {
-        let levels = volume.store.levels().len();
-        if volume.level >= levels {
-            let allowed = format!("0 to {}", levels - 1);
-            return Err(SettingError::new("volume.level", volume.level.to_string(), allowed).into());
+        let Some(values) = volume.only_values().cloned() else {
+            let found = if volume.further.is_empty() { "labels" } else { "several channels" };
+            let allowed = "one channel of values without labels, or `Headless`, which draws others box by box";
+            return Err(SettingError::new("volume", format!("{found} of a volume that is streamed"), allowed).into());
+        };
+        let levels = values.store.levels();
+        if values.level >= levels.len() {
+            let allowed = format!("0 to {}", levels.len() - 1);
+            return Err(SettingError::new("volume.level", values.level.to_string(), allowed).into());
         }
-        Source::check(&volume.store.levels()[volume.level])?;
+        Source::check(&levels[values.level])?;
         let (simd, level) = simd::chosen()?;
-        let (scene, transfer) = settled(&volume.sample, scene)?;
+        let (scene, transfer) = settled(&volume, scene)?;
         let sampled = range_of(volume.sample.values().iter().copied());
-        Ok(Self { volume, scene, transfer, sampled, simd, level })
+        Ok(Self { volume, values, scene, transfer, sampled, simd, level })
     }
 
     /// The settings.
@@ -85,7 +91,7 @@ impl StreamRenderer {
     /// # Errors
     /// As for [`Self::new`]; then nothing changes.
     pub fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        (self.scene, self.transfer) = settled(&self.volume.sample, scene)?;
+        (self.scene, self.transfer) = settled(&self.volume, scene)?;
         Ok(())
     }
 
@@ -161,7 +167,7 @@ impl StreamRenderer {
             return Err(failure.into());
         }
         let Reads { chunks, bytes, most_held, .. } = stream.pool.reads();
-        let StreamedVolume { store, level, .. } = &self.volume;
+        let StreamedLevel { store, level, .. } = &self.values;
         let store = StoreCounts {
             level: *level as u64,
             chunks_total: store.levels()[*level].chunks().as_u64vec3().element_product(),
@@ -181,7 +187,7 @@ impl StreamRenderer {
         if all <= memory as f64 {
             return Ok(());
         }
-        let found = format!("{}, in which 32×32 pixels see a box of voxels of {bytes:.0} bytes", self.volume.level);
+        let found = format!("{}, in which 32×32 pixels see a box of voxels of {bytes:.0} bytes", self.values.level);
         let allowed =
             format!("a coarser level, more pixels, or more memory than {memory} bytes for all threads' boxes");
         Err(SettingError::new("volume.level", found, allowed))
@@ -189,14 +195,14 @@ impl StreamRenderer {
 
     /// The map from values to the numbers that are interpolated, and whether its range is that of all values.
     fn numbers(&self) -> (Normalization, bool) {
-        let known = self.volume.store.range(self.volume.level);
+        let known = self.values.store.range(self.values.level);
         let range = known.or(self.sampled).unwrap_or([0.0; 2]);
         (Normalization::new(range.map(f64::from)), known.is_some())
     }
 
     /// The store in a view.
     fn stream(&self, (scene, view): (&Scene, ViewGeometry), window: &Window) -> Result<Stream, SettingError> {
-        let StreamedVolume { store, level, memory, .. } = &self.volume;
+        let (StreamedLevel { store, level, .. }, memory) = (&self.values, self.volume.memory);
         let (splatting, grid) = (&scene.splatting, store.levels()[*level].grid);
         let slabs = window.with_lead(splatting.compositing, Classification::Before).slabs;
         let threads = current_num_threads();
@@ -222,17 +228,18 @@ impl StreamRenderer {
                     support: Kernel::new(splatting.radius, splatting.falloff).support(),
                 }),
             },
-            pool: Pool::new(usize::try_from(*memory).unwrap_or(usize::MAX)),
+            pool: Pool::new(usize::try_from(memory).unwrap_or(usize::MAX)),
             readers,
         })
     }
 }
 
-/// A scene for a sample with its transfer function, once its classification is known.
-fn settled(sample: &Volume, scene: &Scene) -> Result<(Scene, TransferFunction), RenderError> {
+/// A scene for a volume's sample with its transfer function, once its classification is known.
+fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFunction), RenderError> {
+    let sample = &volume.sample;
     scene.check()?;
     scene.check_volume(sample)?;
     check(scene)?;
-    scene.check_streamed(sample)?;
+    scene.check_streamed(volume)?;
     Ok((scene.classified(sample), scene.resolve(sample)))
 }

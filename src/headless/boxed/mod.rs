@@ -1,36 +1,36 @@
 //! Volumes that fit into no memory, drawn by a backend that draws volumes in memory: region by region, front to back, each time as many slabs (SPEC §11) as
 //! the box of voxels holds that bears on them. Where a region is opaque, no more boxes are read.
 
+mod channel;
 mod chunks;
+mod layers;
 
 use std::ops::Range;
 
 use web_time::Instant;
 
-use super::milliseconds_since;
+use super::{Headless, milliseconds_since};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
+use crate::image::channels::Joining;
 use crate::part::{self, Content, Identity, MergeError, Part};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
 use crate::scene::names::{COMPOSITINGS, name_of};
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Classification, Compositing, Order};
+use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
-use crate::stats::{Counts, Stats, StoreCounts};
-use crate::volume::{StreamedVolume, Volume};
-use chunks::Chunks;
+use crate::stats::{Counts, Stats};
+use crate::volume::StreamedVolume;
+use chunks::{Chunks, Filled};
 
 /// The side in pixels of the regions that an image is divided into. A region whose voxels do not fit into memory is divided further.
 const SIDE: u32 = 256;
 
 /// The minimum side of a region.
 const LEAST_SIDE: u32 = 8;
-
-/// Draws a window of a scene of a volume in memory.
-pub(super) type DrawBox<'a> = dyn FnMut(Volume, &Scene, &Window) -> Result<(Content, Stats), RenderError> + 'a;
 
 /// A view of a volume that is read while it is drawn.
 #[derive(Clone, Debug)]
@@ -45,7 +45,7 @@ impl BoxedView {
     /// # Errors
     /// If a setting of the scene is invalid, or not supported for a volume that is streamed.
     pub(super) fn new(volume: StreamedVolume, scene: &Scene, backend: Backend) -> Result<Self, RenderError> {
-        check(&volume, scene)?;
+        check(&volume, scene, backend)?;
         Ok(Self { volume, scene: scene.clone(), backend })
     }
 
@@ -58,7 +58,7 @@ impl BoxedView {
     }
 
     pub(super) fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        check(&self.volume, scene)?;
+        check(&self.volume, scene, self.backend)?;
         self.scene = scene.clone();
         Ok(())
     }
@@ -70,24 +70,27 @@ impl BoxedView {
     }
 
     /// Draws a frame.
-    pub(super) fn draw(&self, draw: &mut DrawBox<'_>) -> Result<Rendering, RenderError> {
+    pub(super) fn draw(&self, headless: &Headless) -> Result<Rendering, RenderError> {
         let start = Instant::now();
+        if joining(&self.volume, &self.scene).is_some() {
+            return layers::draw(&self.volume, &self.scene, headless);
+        }
         let size = [self.scene.image.width, self.scene.image.height];
-        let (parts, stats) = self.parts(&Window::whole(size), draw)?;
+        let (parts, stats) = self.parts(&Window::whole(size), headless)?;
         let image = Image::merge(parts).map_err(unmerged)?;
         Ok(Rendering { image, stats: Stats { frame_ms: milliseconds_since(start), ..stats } })
     }
 
     /// Draws a part of the image.
-    pub(super) fn draw_part(&self, window: &Window, draw: &mut DrawBox<'_>) -> Result<(Part, Stats), RenderError> {
+    pub(super) fn draw_part(&self, window: &Window, headless: &Headless) -> Result<(Part, Stats), RenderError> {
         let start = Instant::now();
-        let (parts, stats) = self.parts(window, draw)?;
+        let (parts, stats) = self.parts(window, headless)?;
         let part = side_by_side(parts, window);
         Ok((part?, Stats { frame_ms: milliseconds_since(start), ..stats }))
     }
 
     /// The parts of a window, one for each region.
-    fn parts(&self, window: &Window, draw: &mut DrawBox<'_>) -> Result<(Vec<Part>, Stats), RenderError> {
+    fn parts(&self, window: &Window, headless: &Headless) -> Result<(Vec<Part>, Stats), RenderError> {
         let Self { volume, scene, backend } = self;
         part::check(&volume.sample, scene, window)?;
         let scene = scene.explicit(&volume.sample);
@@ -98,7 +101,7 @@ impl BoxedView {
             slabs: window.within(&view.slabs_of(volume.grid())),
             chunks: Chunks::new(volume, &scene, &view)?,
             scene,
-            draw,
+            headless,
             parts: Vec::new(),
             stats: Stats::default(),
         };
@@ -106,13 +109,7 @@ impl BoxedView {
             walk.region(region)?;
         }
         let Walk { chunks, parts, stats, .. } = walk;
-        let level = &volume.store.levels()[volume.level];
-        let store = StoreCounts {
-            level: volume.level as u64,
-            chunks_total: level.chunks().as_u64vec3().element_product(),
-            ..chunks.counts()
-        };
-        let store = volume.with_sample(store);
+        let store = volume.with_sample(chunks.counts());
         let counts = Counts { voxels_total: volume.grid().voxels(), ..stats.counts };
         let [width, height] = view.size;
         // Nothing may have been drawn.
@@ -122,18 +119,19 @@ impl BoxedView {
 }
 
 /// The drawing of some regions.
-struct Walk<'a, 'b> {
+struct Walk<'a> {
     scene: Scene,
     identity: Identity,
     /// The slabs that are drawn.
     slabs: Range<i32>,
     chunks: Chunks<'a>,
-    draw: &'a mut DrawBox<'b>,
+    /// What draws the boxes.
+    headless: &'a Headless,
     parts: Vec<Part>,
     stats: Stats,
 }
 
-impl Walk<'_, '_> {
+impl Walk<'_> {
     /// Draws a region, or where the voxels behind it fit into no memory, its quarters.
     fn region(&mut self, region: Region) -> Result<(), RenderError> {
         let Some(steps) = self.chunks.steps(&region, &self.slabs) else {
@@ -150,7 +148,7 @@ impl Walk<'_, '_> {
             }
             let window = Window { slabs, region };
             let next = match needed.map_or(Ok(None), |needed| self.chunks.read(needed))? {
-                Some(volume) => self.part(volume, &window)?,
+                Some(filled) => self.part(filled, &window)?,
                 None => self.empty(&window),
             };
             drawn = Part::join([drawn, next]).map_err(unmerged)?;
@@ -161,9 +159,9 @@ impl Walk<'_, '_> {
         Ok(())
     }
 
-    /// Draws a window from the voxels that it needs.
-    fn part(&mut self, volume: Volume, window: &Window) -> Result<Part, RenderError> {
-        let (content, stats) = (self.draw)(volume, &self.scene, window)?;
+    /// Draws a window from the voxels that it needs. A channel of which nothing is seen changes nothing, so that its table is left out.
+    fn part(&mut self, (volume, channels): Filled, window: &Window) -> Result<Part, RenderError> {
+        let (content, stats) = self.headless.draw_box(volume, &self.scene.of_channels(&channels), window)?;
         let (counts, prepare_ms) = (self.stats.counts, self.stats.prepare_ms);
         self.stats = Stats { prepare_ms: prepare_ms + stats.prepare_ms, ..stats };
         let own = std::mem::replace(&mut self.stats.counts, counts);
@@ -191,26 +189,41 @@ impl Walk<'_, '_> {
     }
 }
 
-/// Checks that a scene can be drawn box by box.
-fn check(volume: &StreamedVolume, scene: &Scene) -> Result<(), RenderError> {
+/// Checks that a scene can be drawn box by box by a backend.
+fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(), RenderError> {
     scene.check()?;
     scene.check_volume(&volume.sample)?;
-    scene.check_streamed(&volume.sample)?;
-    let classified = scene.classified(&volume.sample);
-    let splatting = &classified.splatting;
-    let by_length = matches!(splatting.compositing, Compositing::Minimum | Compositing::Average);
-    let by_range = splatting.compositing == Compositing::Maximum && splatting.classification == Classification::After;
-    if by_length || by_range {
-        // Along rays, all slabs of the whole volume count; and values of boxes are scaled by their own ranges.
-        let found = format!("{:?}", name_of(COMPOSITINGS, splatting.compositing));
-        let found = match by_range {
-            true => format!("{found} with splatting.classification = \"after\""),
-            false => found,
-        };
-        let found = format!("{found} for a volume that is streamed by this backend");
-        return Err(SettingError::new("splatting.compositing", found, "another one, or the cpu backend").into());
+    scene.check_streamed(volume)?;
+    #[cfg(feature = "cpu")]
+    if backend == Backend::Cpu {
+        crate::cpu::check(scene)?;
     }
-    Ok(())
+    let Splatting { compositing, classification, .. } = scene.classified(&volume.sample).splatting;
+    let by_length = matches!(compositing, Compositing::Minimum | Compositing::Average);
+    let by_range = compositing == Compositing::Maximum && classification == Classification::After;
+    let joining = joining(volume, scene);
+    let is_unlabelled = volume.channels().all(|channel| channel.labels.is_none());
+    // Each channel by itself is then drawn chunk by chunk.
+    let is_by_chunks = backend == Backend::Cpu && is_unlabelled && joining == Some(Joining::Sum);
+    let (of, allowed) = match joining {
+        // Boxes tell only where their own channels are nearest.
+        Some(Joining::Nearest) => ("several channels of a volume that is streamed", "another one, or more memory"),
+        // Along rays, all slabs of the whole volume count; and values of boxes are scaled by their own ranges.
+        _ if (by_length || by_range) && !is_by_chunks => {
+            let other = if is_unlabelled { "another one, or the cpu backend" } else { "another one, or more memory" };
+            ("a volume that is streamed by this backend", other)
+        }
+        _ => return Ok(()),
+    };
+    let after = if by_length { "" } else { " with splatting.classification = \"after\"" };
+    let found = format!("{:?}{after} for {of}", name_of(COMPOSITINGS, compositing));
+    Err(SettingError::new("splatting.compositing", found, allowed).into())
+}
+
+/// How the images of channels become one; `None` if they share sheets, or there is only one.
+fn joining(volume: &StreamedVolume, scene: &Scene) -> Option<Joining> {
+    let are_several = !volume.further.is_empty();
+    Joining::of(scene.splatting.compositing, scene.classification(&volume.sample)).filter(|_| are_several)
 }
 
 /// The squares of some side, or what is left of them, that cover a region.

@@ -18,6 +18,7 @@ mod multiscale;
 mod shards;
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::UVec3;
 
@@ -27,7 +28,7 @@ use super::access::Access;
 use super::loaded::{Levels, Loaded};
 use super::samples::{SIZES, Voxel, dims_of};
 use super::source::invalid;
-use super::store::{Store, StoreLevel, check_box, check_chunk};
+use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
 use super::{Grid, StoreFacts, VolumeError};
 use crate::parallel;
 use crate::stats::StoreCounts;
@@ -104,30 +105,31 @@ fn level_of(image: &Image, channels: u64, bytes: usize, path: &Path, access: &Ac
     Err(invalid(path, "level", found, allowed))
 }
 
-/// Opens one channel of an image at one time. `format` is the name of the format.
-pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result<ZarrStore, VolumeError> {
-    let image = Image::open(path, access)?;
+/// Opens the selected channels of an image at one time. `format` is the name of the format.
+pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
+    let image = Arc::new(Image::open(path, access)?);
     let selection = access.selection();
     image.series.check(path, selection)?;
-    let channels = image.series.channels(selection);
-    if channels.len() > 1 {
-        let allowed = format!("the number of one of them, 0 to {}", channels.end - 1);
-        return Err(invalid(path, "channels", channels.len(), allowed));
-    }
     for level in &image.levels {
         level.array.reserve::<f32>(parallel::current_num_threads(), access)?;
     }
-    let levels =
-        image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() }).collect();
-    let (channel, time) = (u64::from(channels.start), u64::from(selection.time.unwrap_or(0)));
-    let facts = image.stated::<f32>(0, Vec::new()).facts(format, channel as usize);
-    Ok(ZarrStore { image, levels, channel, time, facts })
+    let levels = image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() });
+    let levels: Vec<StoreLevel> = levels.collect();
+    let spacing = Some(image.levels[0].grid.spacing);
+    let stated = Loaded { spacing, ..image.stated::<f32>(0, Vec::new()) };
+    let time = u64::from(selection.time.unwrap_or(0));
+    let store = |(at, channel): (usize, u32)| {
+        let facts = facts_of_channel(stated.facts(format, channel as usize), at);
+        let (image, levels) = (Arc::clone(&image), levels.clone());
+        Arc::new(ZarrStore { image, levels, channel: channel.into(), time, facts }) as Arc<dyn Store>
+    };
+    Ok(image.series.channels(selection).enumerate().map(store).collect())
 }
 
 /// One channel of an image at one time, read by boxes.
 #[derive(Debug)]
-pub(super) struct ZarrStore {
-    image: Image,
+struct ZarrStore {
+    image: Arc<Image>,
     levels: Vec<StoreLevel>,
     channel: u64,
     time: u64,

@@ -145,8 +145,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn levels(volume: &OpenVolume) -> Vec<[u32; 3]> {
     match volume {
         OpenVolume::Whole(volume) => volume.levels().iter().map(|dims| dims.to_array()).collect(),
-        OpenVolume::Streamed(StreamedVolume { store, .. }) => {
-            store.levels().iter().map(|level| level.grid.dims.to_array()).collect()
+        OpenVolume::Streamed(StreamedVolume { first, .. }) => {
+            first.values.store.levels().iter().map(|level| level.grid.dims.to_array()).collect()
         }
     }
 }

@@ -1,0 +1,220 @@
+//! The chunks of one channel of a volume that is streamed: of its values and of its labels.
+
+use std::collections::HashSet;
+
+use glam::UVec3;
+
+use crate::error::RenderError;
+use crate::error::setting::SettingError;
+use crate::lists::iso_range::ValueSet;
+use crate::parallel::prelude::*;
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::range::{EMPTY, union};
+use crate::volume::{Labels, StoreLevel, StreamedChannel, StreamedLevel, Volume, VolumeError, labels_of};
+
+/// The maximum number of chunks of a level.
+const MOST_CHUNKS: u64 = 1 << 24;
+
+/// A box of voxels: the first one, and the one behind the last.
+#[derive(Clone, Copy)]
+pub(super) struct VoxelBox {
+    pub(super) low: UVec3,
+    pub(super) end: UVec3,
+}
+
+impl VoxelBox {
+    /// The number of voxels.
+    pub(super) fn voxels(&self) -> u64 {
+        (self.end - self.low).to_array().iter().fold(1, |all: u64, &n| all.saturating_mul(n.into()))
+    }
+}
+
+/// A channel, and what has been read of it.
+pub(super) struct ChannelChunks<'a> {
+    /// The number of the channel in the volume.
+    pub(super) number: usize,
+    values: LevelChunks<'a>,
+    labels: Option<LevelChunks<'a>>,
+    /// The values that have an opacity, under the tables of any label.
+    opaque: ValueSet,
+    /// Whether points between voxels have values between theirs.
+    is_between: bool,
+    /// Whether chunks are no smaller than the distance at which values bear on what is seen, so that chunks tell what can be seen by their neighbours' values.
+    is_told_by_chunks: bool,
+}
+
+impl<'a> ChannelChunks<'a> {
+    /// A channel, given by its number, under its transfer function. Values bear on points at most `reach` voxels away.
+    ///
+    /// # Errors
+    /// If the chunks are too many.
+    pub(super) fn new(
+        (number, channel): (usize, &'a StreamedChannel),
+        transfer: &TransferFunction,
+        is_after: bool,
+        reach: UVec3,
+    ) -> Result<Self, SettingError> {
+        let values = LevelChunks::new(&channel.values)?;
+        let labels = channel.labels.as_ref().map(LevelChunks::new).transpose()?;
+        let opaque = opaque_values(transfer);
+        let is_told_by_chunks = reach.cmple(values.level.chunk).all();
+        Ok(Self { number, values, labels, opaque, is_between: is_after, is_told_by_chunks })
+    }
+
+    /// Whether any value has an opacity.
+    pub(super) fn has_opacity(&self) -> bool {
+        !self.opaque.ranges().is_empty()
+    }
+
+    /// What is read of the channel.
+    pub(super) fn levels(&self) -> impl Iterator<Item = &LevelChunks<'a>> {
+        std::iter::once(&self.values).chain(&self.labels)
+    }
+
+    /// The bytes in memory of a voxel's value and label.
+    pub(super) fn voxel_bytes(&self) -> u64 {
+        let labels = if self.labels.is_some() { size_of::<u16>() } else { 0 };
+        (size_of::<f32>() + labels) as u64
+    }
+
+    /// Reads a box of the channel; `None` if nothing of it can be seen.
+    ///
+    /// # Errors
+    /// If a store cannot be read, or holds a label that is none.
+    pub(super) fn read(&mut self, within: VoxelBox) -> Result<Option<Volume>, RenderError> {
+        if !self.is_visible(within)? {
+            return Ok(None);
+        }
+        let mut values = self.values.read(within)?;
+        values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f32::NAN);
+        if values.iter().all(|value| value.is_nan()) {
+            return Ok(None);
+        }
+        let dims = within.end - within.low;
+        let volume = Volume::piece(self.values.level.grid.part(within.low, dims), values);
+        let Some(labels) = &mut self.labels else { return Ok(Some(volume)) };
+        let origin = labels.of.origin.clone();
+        let values = labels_of(&origin, (within.low, dims, 1), &labels.read(within)?)?;
+        Ok(Some(volume.with_labels(Labels { origin, dims, spacing: None, values, names: Default::default() })?))
+    }
+
+    /// Whether anything of the chunks in a box can be seen.
+    fn is_visible(&self, within: VoxelBox) -> Result<bool, VolumeError> {
+        if !self.is_told_by_chunks {
+            return Ok(true);
+        }
+        for chunk in self.values.chunks(within) {
+            if self.is_chunk_visible(chunk)? {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// Whether anything of a chunk can be seen.
+    fn is_chunk_visible(&self, chunk: UVec3) -> Result<bool, VolumeError> {
+        let StreamedLevel { store, level, .. } = self.values.of;
+        let last = self.values.level.chunks() - 1;
+        let around = if self.is_between { 1 } else { 0 };
+        let mut range = EMPTY;
+        for chunk in between(chunk.saturating_sub(UVec3::splat(around)), (chunk + around).min(last)) {
+            if store.contains(*level, chunk)? {
+                let Some(own) = store.chunk_range(*level, chunk) else { return Ok(true) };
+                range = union(range, own);
+            } else if store.fill().is_finite() {
+                range = union(range, [store.fill(); 2]);
+            }
+        }
+        let [min, max] = range;
+        Ok(min <= max && self.opaque.meets(min, max))
+    }
+}
+
+/// The values that have an opacity under the tables of any label of a channel.
+pub(super) fn opaque_values(transfer: &TransferFunction) -> ValueSet {
+    let tables = transfer.labels.keys().map(|&label| transfer.tables(Some(label)));
+    tables.fold(ValueSet::of(transfer), |all, tables| all.union(&ValueSet::of_tables(&tables)))
+}
+
+/// A level of a store, and what has been read of it.
+pub(super) struct LevelChunks<'a> {
+    of: &'a StreamedLevel,
+    level: StoreLevel,
+    read: HashSet<UVec3>,
+    bytes_read: u64,
+}
+
+/// What was read of a chunk for a box: the first voxel and the voxels along each axis, their values, and the bytes of the store; no bytes if the store does not hold
+/// the chunk.
+struct Piece {
+    chunk: UVec3,
+    low: UVec3,
+    dims: UVec3,
+    values: Vec<f32>,
+    bytes: Option<u64>,
+}
+
+impl<'a> LevelChunks<'a> {
+    fn new(of: &'a StreamedLevel) -> Result<Self, SettingError> {
+        let level = of.store.levels()[of.level];
+        let count = if level.chunk.min_element() == 0 { 0 } else { level.chunks().as_u64vec3().element_product() };
+        if !(1..=MOST_CHUNKS).contains(&count) {
+            let found = format!("chunks of {} voxels in a level of {}", level.chunk, level.grid.dims);
+            let allowed = format!("at most {MOST_CHUNKS} chunks of at least 1 voxel");
+            return Err(SettingError::new("volume", found, allowed));
+        }
+        Ok(Self { of, level, read: HashSet::new(), bytes_read: 0 })
+    }
+
+    /// The number of chunks of which something was read.
+    pub(super) fn chunks_read(&self) -> u64 {
+        self.read.len() as u64
+    }
+
+    /// Their bytes in the store, each chunk's once.
+    pub(super) fn bytes_read(&self) -> u64 {
+        self.bytes_read
+    }
+
+    /// The chunks that share voxels with a box.
+    fn chunks(&self, VoxelBox { low, end }: VoxelBox) -> impl Iterator<Item = UVec3> {
+        between(low / self.level.chunk, (end - 1) / self.level.chunk)
+    }
+
+    /// Reads the values of a box.
+    fn read(&mut self, within: VoxelBox) -> Result<Vec<f32>, VolumeError> {
+        let VoxelBox { low, end } = within;
+        let chunks: Vec<UVec3> = self.chunks(within).collect();
+        let grid = self.level.grid.part(low, end - low);
+        let pieces = chunks.into_par_iter().map(|chunk| self.piece(chunk, within));
+        let pieces = pieces.collect::<Result<Vec<_>, _>>()?;
+        let mut values = vec![f32::NAN; grid.dims.element_product() as usize];
+        for Piece { chunk, low: from, dims, values: own, bytes } in pieces {
+            for (row, number) in own.chunks_exact(dims.x as usize).zip(0..) {
+                let first = from - low + UVec3::new(0, number % dims.y, number / dims.y);
+                values[grid.index_of(first) as usize..][..row.len()].copy_from_slice(row);
+            }
+            if let Some(bytes) = bytes.filter(|_| self.read.insert(chunk)) {
+                self.bytes_read += bytes;
+            }
+        }
+        Ok(values)
+    }
+
+    /// Reads the part of a chunk that lies in a box.
+    fn piece(&self, chunk: UVec3, within: VoxelBox) -> Result<Piece, VolumeError> {
+        let (StreamedLevel { store, level, .. }, side) = (self.of, self.level.chunk);
+        let low = within.low.max(chunk * side);
+        let dims = within.end.min((chunk + 1) * side) - low;
+        let mut values = vec![store.fill(); dims.element_product() as usize];
+        let is_held = store.contains(*level, chunk)?;
+        let bytes = is_held.then(|| store.read(*level, low, dims, &mut values)).transpose()?;
+        Ok(Piece { chunk, low, dims, values, bytes })
+    }
+}
+
+/// All chunks from one to another.
+fn between(first: UVec3, last: UVec3) -> impl Iterator<Item = UVec3> {
+    let row = move |y, z| (first.x..=last.x).map(move |x| UVec3::new(x, y, z));
+    (first.z..=last.z).flat_map(move |z| (first.y..=last.y).flat_map(move |y| row(y, z)))
+}
