@@ -98,6 +98,7 @@ fn streamed_file(settings: &Channel, access: &Access) -> Result<Streamed, Volume
         Ok(StreamedLevel::new(origin, store, level as usize))
     };
     let mut channels = stores.into_iter().map(|store| streamed(origin(&settings.volume), store).map(Into::into));
+    // Every file has a channel.
     let first: StreamedChannel = channels.next().unwrap_or_else(|| Err(in_memory("volume")))?;
     let further = channels.collect::<Result<_, VolumeError>>()?;
     let Some(path) = &settings.labels else { return Ok((first, further)) };

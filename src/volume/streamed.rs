@@ -119,7 +119,7 @@ impl StreamedVolume {
     /// As [`Self::new`], of several channels and labels, which all lie on the grid of the first channel's level. The memory is for all of them together.
     ///
     /// # Errors
-    /// As for [`Self::new`], if a level lies on another grid, or if a label in the sample is none.
+    /// As for [`Self::new`], if a level lies on another grid, or if a value of labels in the sample is no label.
     pub fn of_channels(
         first: StreamedChannel,
         further: Vec<StreamedChannel>,
@@ -243,7 +243,7 @@ fn other_grid(found: &StreamedLevel, key: &str, name: &str, of: &StreamedChannel
 /// A sample of all channels and labels ([`sample`](super::sample())), which takes at most some bytes, of a level that all of them have.
 ///
 /// # Errors
-/// If a level lies on another grid than the first channel's, a store cannot be read or holds no finite value in the sample, or a label is none.
+/// If a level lies on another grid than the first channel's, a store cannot be read or holds no finite value in the sample, or a value of labels is no label.
 pub(crate) fn sample_of_channels(
     (first, further): (&StreamedChannel, &[StreamedChannel]),
     memory: u64,

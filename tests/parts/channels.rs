@@ -282,6 +282,11 @@ fn channels_that_do_not_belong_together_are_refused() {
         let error = headless(Backend::Reference).view(other, &scene(2, &[])).unwrap_err().to_string();
         assert!(error.starts_with(&format!("volume: found a sample of {found}")), "{error}");
     }
+    // What was put together by hand is checked, too.
+    let mut other = streamed.clone();
+    other.further[0].values = level("pet", dims - 1, spacing, 1.0);
+    let error = headless(Backend::Cpu).view(other, &scene(2, &[])).unwrap_err().to_string();
+    assert!(error.starts_with("pet: channel[1].volume: found a grid of "), "{error}");
     for (backend, compositing, classification, expected) in [
         (
             Backend::Cpu,

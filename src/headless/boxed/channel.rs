@@ -1,6 +1,6 @@
 //! The chunks of one channel of a volume that is streamed: of its values and of its labels.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 use glam::UVec3;
 
@@ -10,7 +10,7 @@ use crate::lists::iso_range::ValueSet;
 use crate::parallel::prelude::*;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::range::{EMPTY, union};
-use crate::volume::{Labels, StoreLevel, StreamedChannel, StreamedLevel, Volume, VolumeError, labels_of};
+use crate::volume::{Grid, Labels, StoreLevel, StreamedChannel, StreamedLevel, Volume, VolumeError, labels_of};
 
 /// The maximum number of chunks of a level.
 const MOST_CHUNKS: u64 = 1 << 24;
@@ -77,11 +77,11 @@ impl<'a> ChannelChunks<'a> {
         (size_of::<f32>() + labels) as u64
     }
 
-    /// Reads a box of the channel; `None` if nothing of it can be seen.
+    /// Reads a box of the channel, whose voxels lie on a grid; `None` if nothing of it can be seen.
     ///
     /// # Errors
-    /// If a store cannot be read, or holds a label that is none.
-    pub(super) fn read(&mut self, within: VoxelBox) -> Result<Option<Volume>, RenderError> {
+    /// If a store cannot be read, or holds a value that is no label.
+    pub(super) fn read(&mut self, within: VoxelBox, grid: &Grid) -> Result<Option<Volume>, RenderError> {
         if !self.is_visible(within)? {
             return Ok(None);
         }
@@ -90,12 +90,12 @@ impl<'a> ChannelChunks<'a> {
         if values.iter().all(|value| value.is_nan()) {
             return Ok(None);
         }
-        let dims = within.end - within.low;
-        let volume = Volume::piece(self.values.level.grid.part(within.low, dims), values);
+        let volume = Volume::piece(*grid, values);
         let Some(labels) = &mut self.labels else { return Ok(Some(volume)) };
         let origin = labels.of.origin.clone();
-        let values = labels_of(&origin, (within.low, dims, 1), &labels.read(within)?)?;
-        Ok(Some(volume.with_labels(Labels { origin, dims, spacing: None, values, names: Default::default() })?))
+        let values = labels_of(&origin, (within.low, grid.dims, 1), &labels.read(within)?)?;
+        let labels = Labels { origin, dims: grid.dims, spacing: None, values, names: BTreeMap::new() };
+        Ok(Some(volume.with_labels(labels)?))
     }
 
     /// Whether anything of the chunks in a box can be seen.

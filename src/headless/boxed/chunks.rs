@@ -117,11 +117,12 @@ impl<'a> Chunks<'a> {
     /// Reads a box of the channels of which something can be seen there; `None` if there are none.
     ///
     /// # Errors
-    /// If a store cannot be read, or holds a label that is none.
+    /// If a store cannot be read, or holds a value that is no label.
     pub(super) fn read(&mut self, within: VoxelBox) -> Result<Option<Filled>, RenderError> {
+        let grid = self.volume.grid().part(within.low, within.end - within.low);
         let (mut filled, mut numbers) = (Vec::new(), Vec::new());
         for channel in &mut self.channels {
-            if let Some(volume) = channel.read(within)? {
+            if let Some(volume) = channel.read(within, &grid)? {
                 filled.push(volume);
                 numbers.push(channel.number);
             }

@@ -23,7 +23,7 @@ use crate::settings::camera::Camera;
 use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
-use crate::volume::StreamedVolume;
+use crate::volume::{StreamedVolume, check_grids};
 use chunks::{Chunks, Filled};
 
 /// The side in pixels of the regions that an image is divided into. A region whose voxels do not fit into memory is divided further.
@@ -192,6 +192,7 @@ impl Walk<'_> {
 /// Checks that a scene can be drawn box by box by a backend.
 fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(), RenderError> {
     scene.check()?;
+    check_grids((&volume.first, &volume.further))?;
     scene.check_volume(&volume.sample)?;
     scene.check_streamed(volume)?;
     #[cfg(feature = "cpu")]
@@ -206,7 +207,7 @@ fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(),
     // Each channel by itself is then drawn chunk by chunk.
     let is_by_chunks = backend == Backend::Cpu && is_unlabelled && joining == Some(Joining::Sum);
     let (of, allowed) = match joining {
-        // Boxes tell only where their own channels are nearest.
+        // First hits tell which channel is the nearest, and parts do not carry them.
         Some(Joining::Nearest) => ("several channels of a volume that is streamed", "another one, or more memory"),
         // Along rays, all slabs of the whole volume count; and values of boxes are scaled by their own ranges.
         _ if (by_length || by_range) && !is_by_chunks => {
