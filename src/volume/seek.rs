@@ -73,7 +73,6 @@ impl FileStore {
     }
 
     /// One channel of a file.
-
     pub(super) fn new(
         located: Located,
         channel: u32,

@@ -179,6 +179,7 @@ impl StreamedVolume {
     }
 
     /// The values of the only channel, if there are no others and no labels.
+    #[cfg(feature = "cpu")]
     pub(crate) fn only_values(&self) -> Option<&StreamedLevel> {
         (self.further.is_empty() && self.first.labels.is_none()).then_some(&self.first.values)
     }
