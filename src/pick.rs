@@ -44,7 +44,7 @@ impl Pick {
         let voxel = (from_center / grid.spacing + grid.center()).round().clamp(DVec3::ZERO, last).as_uvec3();
         let index = grid.index_of(voxel);
         let opacity = |(volume, transfer): (&Volume, &TransferFunction)| {
-            let value = f64::from(volume.values()[index as usize]);
+            let value = f64::from(volume.values().at(index as usize));
             let tables = transfer.tables(volume.label(index));
             if value.is_nan() {
                 0.0
@@ -55,7 +55,7 @@ impl Pick {
         let opacities = volume.channels().zip(transfer.channels()).map(opacity).enumerate();
         let (channel, _) = opacities.fold((0, 0.0), |best, of| if of.1 > best.1 { of } else { best });
         let of_channel = volume.channel(channel).unwrap_or(volume);
-        let (value, label) = (of_channel.values()[index as usize], of_channel.label(index));
+        let (value, label) = (of_channel.values().at(index as usize), of_channel.label(index));
         Self { position, depth, voxel, channel, value, label }
     }
 

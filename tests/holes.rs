@@ -25,7 +25,7 @@ const HOLES: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 /// The same volume with holes in it.
 fn punched(volume: &Volume, mut is_hole: impl FnMut(UVec3) -> bool) -> Volume {
     let grid = volume.grid();
-    let sample = |(index, &value)| if is_hole(grid.voxel_at(index)) { HOLES[index as usize % 3] } else { value };
+    let sample = |(index, value)| if is_hole(grid.voxel_at(index)) { HOLES[index as usize % 3] } else { value };
     let values = (0..).zip(volume.values()).map(sample).collect();
     Volume::new("holes", grid.dims, grid.spacing, values).unwrap()
 }
@@ -186,7 +186,7 @@ fn a_hole_is_a_hidden_voxel() {
             values: volume.values().iter().map(|value| u16::from(value.is_nan())).collect(),
             names: BTreeMap::new(),
         };
-        let filled = volume.values().iter().map(|&value| if value.is_nan() { 200.0 } else { value }).collect();
+        let filled = volume.values().iter().map(|value| if value.is_nan() { 200.0 } else { value }).collect();
         let filled = Volume::new("filled", volume.dims(), volume.spacing(), filled).unwrap();
         let filled = filled.with_labels(labels).unwrap();
         for (compositing, camera) in COMPOSITINGS.into_iter().zip(cameras().into_iter().cycle()) {
@@ -224,7 +224,7 @@ fn lists_leave_holes_out() {
     let scene = translucent(cameras()[0]);
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
     let finite = volume.values().len() as u64 - volume.holes();
-    let above = |value: f32| volume.values().iter().filter(|&&found| found >= value).count() as u64;
+    let above = |value: f32| volume.values().iter().filter(|&found| found >= value).count() as u64;
     for (iso_ranges, expected) in [
         (Some(vec![[-1e300, -1.0]]), 0),
         (None, finite),
@@ -238,8 +238,8 @@ fn lists_leave_holes_out() {
         assert!(drawn.image == gpu.render_volume(volume.clone(), &fresh).unwrap().image);
     }
     let list = view.volume().value_list();
-    let least = volume.values().iter().copied().fold(f32::INFINITY, f32::min);
-    let background = volume.values().iter().filter(|&&value| value == least).count() as u64;
+    let least = volume.values().iter().fold(f32::INFINITY, f32::min);
+    let background = volume.values().iter().filter(|&value| value == least).count() as u64;
     assert_eq!(list.bytes(), 4 * (finite - background));
 }
 
@@ -249,7 +249,7 @@ fn appearance_is_that_of_the_finite_samples() {
     let padded = |volume: &Volume| {
         let dims = volume.dims();
         let layers = vec![f32::NAN; 3 * (dims.x * dims.y) as usize];
-        let values = [&layers, volume.values(), &layers].concat();
+        let values = [layers.clone(), volume.values().to_vec(), layers].concat();
         Volume::new("padded", dims + UVec3::Z * 6, volume.spacing(), values).unwrap()
     };
     let bare = |volume: Volume| Volume::new("bare", volume.dims(), volume.spacing(), volume.values().to_vec()).unwrap();

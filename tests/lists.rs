@@ -40,7 +40,7 @@ fn head() -> (Arc<Volume>, Scene) {
 fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
     (0..)
         .zip(volume.values())
-        .map(|(index, &value)| {
+        .map(|(index, value)| {
             let gradient = volume.gradient(volume.grid().voxel_at(index));
             transfer.tables(volume.label(index)).alpha(value.into(), gradient.length()) > 0.0
         })
@@ -441,8 +441,8 @@ fn the_value_list_leaves_out_the_background() {
     let gpu = gpu();
     let (volume, scene) = head();
     let view = gpu.view(volume.clone(), &scene).unwrap();
-    let least = volume.values().iter().copied().fold(f32::INFINITY, f32::min);
-    let background = volume.values().iter().filter(|&&value| value == least).count();
+    let least = volume.values().iter().fold(f32::INFINITY, f32::min);
+    let background = volume.values().iter().filter(|&value| value == least).count();
     assert!(background > 1000);
     let list = view.volume().value_list();
     assert_eq!(list.bytes(), 4 * (volume.values().len() - background) as u64);
@@ -465,7 +465,7 @@ fn slices_together_hold_what_the_volume_list_holds() {
         let mut found = Vec::new();
         for slice in 0..lists.len() {
             for voxels in lists.within(values, slice, &set) {
-                assert!(voxels.is_sorted_by_key(|&voxel| ordinal(values[voxel as usize])));
+                assert!(voxels.is_sorted_by_key(|&voxel| ordinal(values.at(voxel as usize))));
                 assert!(voxels.iter().all(|&voxel| volume.grid().voxel_at(voxel)[axis] as usize == slice));
                 found.extend_from_slice(voxels);
             }

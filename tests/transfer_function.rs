@@ -67,10 +67,10 @@ fn chosen(values: Vec<f32>) -> TransferFunction {
     let transfer = TransferFunction::from_histogram(&volume);
     assert_eq!(Ramp::new(transfer.color.points().to_vec()).as_ref(), Ok(&transfer.color));
     assert_eq!(Ramp::new(transfer.opacity.points().to_vec()).as_ref(), Ok(&transfer.opacity));
-    let alphas = || volume.values().iter().map(|&value| transfer.alpha(f64::from(value), 0.0));
+    let alphas = || volume.values().iter().map(|value| transfer.alpha(f64::from(value), 0.0));
     assert!(alphas().all(|alpha| (0.0..=1.0).contains(&alpha)));
     assert!(alphas().any(|alpha| alpha >= 0.5), "nothing shows");
-    for &value in volume.values() {
+    for value in volume.values() {
         let color = transfer.color.at(f64::from(value));
         assert!(color.is_finite() && color.min_element() >= 0.0 && color.max_element() <= 1.0);
     }

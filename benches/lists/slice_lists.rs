@@ -7,7 +7,7 @@ use glam::UVec3;
 use rayon::prelude::*;
 
 use sheetsplat::internals::iso_range::{ValueSet, ordinal};
-use sheetsplat::volume::Grid;
+use sheetsplat::volume::{Grid, ValueSlice};
 
 /// The lists of the slices across one axis.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -17,7 +17,7 @@ pub(crate) struct SliceLists {
 
 impl SliceLists {
     /// Sorts a volume's voxels, slice by slice across the axis 0, 1 or 2.
-    pub(crate) fn new(values: &[f32], grid: &Grid, axis: usize) -> Self {
+    pub(crate) fn new(values: ValueSlice<'_>, grid: &Grid, axis: usize) -> Self {
         let [across, up] = [(axis + 1) % 3, (axis + 2) % 3];
         let slice = |at: u32| {
             let voxels = (0..grid.dims[up]).flat_map(|y| (0..grid.dims[across]).map(move |x| (x, y)));
@@ -26,7 +26,7 @@ impl SliceLists {
                     let mut voxel = UVec3::ZERO;
                     (voxel[axis], voxel[across], voxel[up]) = (at, x, y);
                     let index = grid.index_of(voxel);
-                    u64::from(ordinal(values[index as usize])) << 32 | u64::from(index)
+                    u64::from(ordinal(values.at(index as usize))) << 32 | u64::from(index)
                 })
                 .collect();
             keyed.sort_unstable();
@@ -38,12 +38,12 @@ impl SliceLists {
     /// The voxels of one slice whose values are in a set, range by range: two binary searches each.
     pub(crate) fn within<'a>(
         &'a self,
-        values: &'a [f32],
+        values: ValueSlice<'a>,
         slice: usize,
         set: &'a ValueSet,
     ) -> impl Iterator<Item = &'a [u32]> + 'a {
         let sorted = &self.slices[slice];
-        let start = |bound: u32| sorted.partition_point(|&voxel| ordinal(values[voxel as usize]) < bound);
+        let start = move |bound: u32| sorted.partition_point(|&voxel| ordinal(values.at(voxel as usize)) < bound);
         set.ranges().iter().map(move |&Range { start: first, end }| &sorted[start(first)..start(end)])
     }
 

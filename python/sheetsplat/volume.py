@@ -82,7 +82,7 @@ class Volume:
             self._native = _open(source, memory, progress, [channel, time, level], None, steps, labels, index)
             return
         if channel_axis is None and isinstance(source, Volume):
-            tags = None if labels is None else _array(labels, "labels", 0, limit)
+            tags = None if labels is None else _array(labels, "labels", [], limit)
             self._native = source._native
             if steps is not None or tags is not None:
                 self._native = self._native.replaced(steps, tags, limit)
@@ -94,7 +94,7 @@ class Volume:
         else:
             array, own_spacing, axes, origin = _converted(source, limit)
             channels = [array]
-        tags = None if labels is None else _array(labels, "labels", len(channels), limit)
+        tags = None if labels is None else _array(labels, "labels", [_bytes(values) for values in channels], limit)
         self._native = native.Volume.from_arrays(channels, steps or own_spacing, tags, axes, origin, limit)
 
     @classmethod
@@ -114,6 +114,11 @@ class Volume:
         """World units between voxels along z, y and x."""
         z, y, x = self._native.spacing
         return z, y, x
+
+    @property
+    def nbytes(self) -> int:
+        """The bytes of memory that the values of all channels take, in the fewest bits that hold them; if the volume is streamed, those of a sample."""
+        return self._native.nbytes
 
     @property
     def channels(self) -> int:
@@ -187,7 +192,7 @@ def _open(
         None if number is None else whole(key, number, 0, 2**32 - 1, VolumeError)
         for key, number in zip(("channel", "time", "level"), selection, strict=True)
     ]
-    tags = None if labels is None else _array(labels, "labels", 0, limit)
+    tags = None if labels is None else _array(labels, "labels", [], limit)
     if name.startswith(_BUILTIN):
         progress = False
     with loading(name, progress) as bytes_read:
@@ -223,10 +228,19 @@ def _numpy(source: Any, name: str, allowed: str) -> NDArray[Any]:
         raise _refused(name, f"{type(error).__name__}: {error}", allowed) from error
 
 
-def _array(source: Any, name: str, channels: int, limit: str | None) -> NDArray[Any]:
+def _bytes(source: Any) -> int:
+    """The bytes that each value of an array, in whatever form it has, takes in a volume: as many as it has if it is an integer of at most two, else four."""
+    dtype = getattr(source, "dtype", None)
+    # Other libraries than NumPy tell the type by its name alone.
+    is_integer = getattr(dtype, "kind", None) in ("i", "u", "b") or "int" in str(dtype) or str(dtype).endswith("bool")
+    size = getattr(dtype, "itemsize", 4)
+    return size if is_integer and size <= 2 else 4
+
+
+def _array(source: Any, name: str, channels: list[int], limit: str | None) -> NDArray[Any]:
     """The array `[z, y, x]`, in whatever form it has.
 
-    It is one of several channels, or labels beside some, which must fit into a number of bytes together.
+    It is one of several channels, of which each value takes some bytes, or labels beside some, which must fit into a number of bytes together.
     """
     import numpy as np
 
@@ -260,7 +274,8 @@ def _channels(source: Any, axis: int, limit: str | None) -> list[NDArray[Any]]:
     shape = getattr(source, "shape", None)
     if isinstance(shape, tuple) and len(shape) == 4 and -4 <= axis < 4 and shape[axis] > 0:
         sizes = list(shape)
-        native.check_sizes(sizes, sizes.pop(axis), False, limit)
+        count = sizes.pop(axis)
+        native.check_sizes(sizes, [_bytes(source)] * count, False, limit)
     array = _numpy(source, "array", "four dimensions") if hasattr(source, "__array__") else None
     if array is None or array.ndim != 4 or not -4 <= axis < 4:
         found = type(source).__name__ if array is None else f"{array.ndim} dimensions with channel_axis={axis}"
@@ -268,7 +283,7 @@ def _channels(source: Any, axis: int, limit: str | None) -> list[NDArray[Any]]:
     if array.shape[axis] == 0:
         raise _refused("shape", "no channel", "at least one")
     count = array.shape[axis]
-    return [_array(channel, "array", count, limit) for channel in np.moveaxis(array, axis, 0)]
+    return [_array(channel, "array", [_bytes(array)] * count, limit) for channel in np.moveaxis(array, axis, 0)]
 
 
 _Converted = tuple["NDArray[Any]", tuple[float, float, float], "list[list[float]] | None", "list[float]"]
@@ -279,7 +294,7 @@ def _converted(source: Any, limit: str | None) -> _Converted:
         return _of_itk(source, limit)
     if hasattr(source, "affine") and hasattr(source, "dataobj"):
         return _of_nibabel(source, limit)
-    return _array(source, "array", 1, limit), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
+    return _array(source, "array", [_bytes(source)], limit), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
 
 
 def _of_itk(image: Any, limit: str | None) -> _Converted:
@@ -287,7 +302,8 @@ def _of_itk(image: Any, limit: str | None) -> _Converted:
     import SimpleITK
 
     spacing = image.GetSpacing()
-    array = _array(SimpleITK.GetArrayViewFromImage(image), "array", 1, limit)
+    values = SimpleITK.GetArrayViewFromImage(image)
+    array = _array(values, "array", [_bytes(values)], limit)
     if len(spacing) != 3:
         raise _refused("spacing", repr(spacing), "an image of three dimensions")
     rows = image.GetDirection()
@@ -305,11 +321,11 @@ def _of_nibabel(image: Any, limit: str | None) -> _Converted:
         array = array[..., 0]
     affine = image.affine
     if affine is None:
-        return _array(array.T, "array", 1, limit), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
+        return _array(array.T, "array", [_bytes(array)], limit), (1.0, 1.0, 1.0), None, [0.0, 0.0, 0.0]
     steps = np.asarray(affine, dtype=float)
     lengths = np.linalg.norm(steps[:3, :3], axis=0)
     if not (np.isfinite(steps).all() and (lengths > 0).all()):
         raise _refused("affine", repr(affine), "finite axes of positive length")
     axes = (steps[:3, :3] / lengths).T.tolist()
     x, y, z = (float(length) for length in lengths)
-    return _array(array.T, "array", 1, limit), (z, y, x), axes, steps[:3, 3].tolist()
+    return _array(array.T, "array", [_bytes(array)], limit), (z, y, x), axes, steps[:3, 3].tolist()

@@ -1,13 +1,15 @@
 //! Values and labels of voxels from NumPy arrays, in the library's own form: one pass over an array, whatever its strides, into memory that was
-//! reserved before.
+//! reserved before. Values of 8 and 16 bits stay as they are, all others become `f32`.
 
 use std::fmt::Display;
+use std::marker::PhantomData;
 use std::sync::Arc;
 
 use numpy::ndarray::ArrayView3;
 use numpy::{Element, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
+use sheetsplat::volume::Values;
 
 use crate::error::{self, Raised};
 
@@ -23,21 +25,38 @@ trait Sample: Element + Copy + Display {
 }
 
 /// What samples become: values or labels.
-trait Voxel: Copy + Default {
-    fn of(sample: impl Sample) -> Option<Self>;
+trait Voxels {
+    type Voxel: Copy + Default;
+
+    fn of(sample: impl Sample) -> Option<Self::Voxel>;
 }
 
-impl Voxel for f32 {
-    fn of(sample: impl Sample) -> Option<Self> {
-        Some(sample.value())
-    }
-}
+/// Labels.
+struct OfLabels;
 
-impl Voxel for u16 {
-    fn of(sample: impl Sample) -> Option<Self> {
+impl Voxels for OfLabels {
+    type Voxel = u16;
+
+    fn of(sample: impl Sample) -> Option<u16> {
         sample.label()
     }
 }
+
+/// Values of a type that holds the samples.
+struct OfValues<T>(PhantomData<T>);
+
+macro_rules! of_values {
+    ($($type:ty),*) => {
+        $(impl Voxels for OfValues<$type> {
+            type Voxel = $type;
+
+            fn of(sample: impl Sample) -> Option<$type> {
+                Some(sample.value() as $type)
+            }
+        })*
+    };
+}
+of_values! { i8, u8, i16, u16, f32 }
 
 /// Calls a macro with each type of sample.
 macro_rules! for_each_type {
@@ -83,15 +102,16 @@ impl Sizes {
         Ok(Self { shape: [z, y, x], voxels: count? as usize })
     }
 
-    /// Checks that values of some channels and labels fit into a number of bytes.
-    pub(crate) fn check(&self, channels: usize, labels: bool, limit: u64) -> Result<(), Raised> {
-        let bytes = self.bytes::<f32>().saturating_mul(channels as u64);
+    /// Checks that the values of some channels, of which each value takes some bytes, and labels fit into a number of bytes.
+    pub(crate) fn check(&self, channels: &[usize], labels: bool, limit: u64) -> Result<(), Raised> {
+        let of_voxel = channels.iter().fold(0_u64, |sum, &bytes| sum.saturating_add(bytes as u64));
+        let bytes = of_voxel.saturating_mul(self.voxels as u64);
         let bytes = if labels { bytes.saturating_add(self.bytes::<u16>()) } else { bytes };
         if bytes <= limit {
             return Ok(());
         }
         let [z, y, x] = self.shape;
-        let of = if channels == 1 { String::new() } else { format!(" of {channels} channels") };
+        let of = if channels.len() < 2 { String::new() } else { format!(" of {} channels", channels.len()) };
         let with = if labels { " with labels" } else { "" };
         let found = format!("{z}×{y}×{x} voxels{of}{with}, which take {bytes} bytes");
         Err(error::volume("memory", &found, &format!("at most the memory limit of {limit} bytes")))
@@ -109,7 +129,7 @@ impl Sizes {
     }
 
     /// Memory for one voxel of some type each.
-    fn reserved<V: Voxel>(&self) -> Result<Vec<V>, Raised> {
+    fn reserved<V>(&self) -> Result<Vec<V>, Raised> {
         let mut voxels = Vec::new();
         voxels.try_reserve_exact(self.voxels).map_err(|_| {
             let found = format!("{} bytes", self.bytes::<V>());
@@ -124,13 +144,43 @@ pub(crate) fn sizes(array: &Bound<'_, PyAny>) -> Result<Sizes, Raised> {
     Sizes::of(array.cast::<PyUntypedArray>().map_err(|_| untyped(array))?.shape())
 }
 
+/// The bytes that each value of an array takes in the library's own form; fewer if it then turns out that fewer hold them all.
+pub(crate) fn value_bytes(array: &Bound<'_, PyAny>) -> PyResult<usize> {
+    Ok(match kind_and_bytes(array)? {
+        (kind, bytes @ 1..=2) if kind != "f" => bytes,
+        _ => size_of::<f32>(),
+    })
+}
+
+/// The letter by which NumPy calls the kind of an array's samples, and their bytes.
+fn kind_and_bytes(array: &Bound<'_, PyAny>) -> PyResult<(String, usize)> {
+    let dtype = array.getattr("dtype")?;
+    Ok((dtype.getattr("kind")?.extract()?, dtype.getattr("itemsize")?.extract()?))
+}
+
 /// The sizes and values of an array `[z, y, x]`, x fastest.
-pub(crate) fn values(array: &Bound<'_, PyAny>) -> Result<([u32; 3], Vec<f32>), Raised> {
+pub(crate) fn values(array: &Bound<'_, PyAny>) -> Result<([u32; 3], Values), Raised> {
     let sizes = sizes(array)?;
-    let mut values = sizes.reserved()?;
-    values.resize(sizes.voxels, 0.0);
-    fill(array, &mut values, sizes.shape)?;
+    let (kind, bytes) = kind_and_bytes(array)?;
+    let values = match (kind.as_str(), bytes) {
+        ("i", 1) => filled::<i8>(array, &sizes)?.into(),
+        ("u", 1) => filled::<u8>(array, &sizes)?.into(),
+        ("i", 2) => filled::<i16>(array, &sizes)?.into(),
+        ("u", 2) => filled::<u16>(array, &sizes)?.into(),
+        _ => filled::<f32>(array, &sizes)?.into(),
+    };
     Ok((sizes.dims(), values))
+}
+
+/// The values of an array as numbers of a type.
+fn filled<T: Copy + Default>(array: &Bound<'_, PyAny>, sizes: &Sizes) -> Result<Vec<T>, Raised>
+where
+    OfValues<T>: Voxels<Voxel = T>,
+{
+    let mut values = sizes.reserved()?;
+    values.resize(sizes.voxels, T::default());
+    fill::<OfValues<T>>(array, &mut values, sizes.shape)?;
+    Ok(values)
 }
 
 /// The sizes and labels of an array `[z, y, x]`, x fastest.
@@ -139,7 +189,7 @@ pub(crate) fn labels(array: &Bound<'_, PyAny>) -> Result<([u32; 3], Arc<[u16]>),
     // Shared memory cannot be asked for in a way that may fail. This asks for as much, and gives it back.
     drop(sizes.reserved::<u16>()?);
     let mut labels: Arc<[u16]> = std::iter::repeat_n(0, sizes.voxels).collect();
-    fill(array, Arc::make_mut(&mut labels), sizes.shape)?;
+    fill::<OfLabels>(array, Arc::make_mut(&mut labels), sizes.shape)?;
     Ok((sizes.dims(), labels))
 }
 
@@ -157,8 +207,8 @@ fn typed<'py, T: Element>(array: &Bound<'py, PyAny>) -> Option<PyReadonlyArray3<
 
 /// Fills memory with the samples of an array. Samples that the processor cannot read, such as those of another byte order, are first converted
 /// by NumPy, a block at a time.
-fn fill<V: Voxel>(array: &Bound<'_, PyAny>, voxels: &mut [V], shape: [usize; 3]) -> Result<(), Raised> {
-    if fill_typed(array, voxels, [0; 3])? {
+fn fill<V: Voxels>(array: &Bound<'_, PyAny>, voxels: &mut [V::Voxel], shape: [usize; 3]) -> Result<(), Raised> {
+    if fill_typed::<V>(array, voxels, [0; 3])? {
         return Ok(());
     }
     let code = converted(array)?;
@@ -173,7 +223,7 @@ fn fill<V: Voxel>(array: &Bound<'_, PyAny>, voxels: &mut [V], shape: [usize; 3])
         let slice = |axis: usize| PySlice::new(array.py(), first[axis] as isize, ends[axis] as isize, 1);
         let block = array.get_item((slice(0), slice(1), slice(2)))?.call_method1("astype", (code.as_str(),))?;
         let (of_block, rest) = voxels.split_at_mut((0..3).map(|axis| ends[axis] - first[axis]).product());
-        if !fill_typed(&block, of_block, first)? {
+        if !fill_typed::<V>(&block, of_block, first)? {
             return Err(untyped(array));
         }
         voxels = rest;
@@ -189,8 +239,7 @@ fn places(shape: [usize; 3], block: [usize; 3]) -> impl Iterator<Item = [usize; 
 
 /// The type to which NumPy converts the samples of an array: the same in the machine's byte order, or the nearest that holds them.
 fn converted(array: &Bound<'_, PyAny>) -> Result<String, Raised> {
-    let dtype = array.getattr("dtype")?;
-    let (kind, bytes): (String, usize) = (dtype.getattr("kind")?.extract()?, dtype.getattr("itemsize")?.extract()?);
+    let (kind, bytes) = kind_and_bytes(array)?;
     Ok(match (kind.as_str(), bytes) {
         ("f", 0..=4) => "f4".to_owned(),
         ("f", _) => "f8".to_owned(),
@@ -199,11 +248,11 @@ fn converted(array: &Bound<'_, PyAny>) -> Result<String, Raised> {
 }
 
 /// Fills memory with the samples of an array, or of a block of one that begins at a voxel, if they have one of the types; whether they do.
-fn fill_typed<V: Voxel>(array: &Bound<'_, PyAny>, voxels: &mut [V], first: [usize; 3]) -> Result<bool, Raised> {
+fn fill_typed<V: Voxels>(array: &Bound<'_, PyAny>, voxels: &mut [V::Voxel], first: [usize; 3]) -> Result<bool, Raised> {
     macro_rules! fill {
         ($($type:ty),*) => {
             $(if let Some(array) = typed::<$type>(array) {
-                return fill_from(array.as_array(), voxels, first).map(|()| true);
+                return fill_from::<$type, V>(array.as_array(), voxels, first).map(|()| true);
             })*
         };
     }
@@ -211,12 +260,12 @@ fn fill_typed<V: Voxel>(array: &Bound<'_, PyAny>, voxels: &mut [V], first: [usiz
     Ok(false)
 }
 
-fn fill_from<T: Sample, V: Voxel>(
+fn fill_from<T: Sample, V: Voxels>(
     samples: ArrayView3<'_, T>,
-    voxels: &mut [V],
+    voxels: &mut [V::Voxel],
     first: [usize; 3],
 ) -> Result<(), Raised> {
-    let is_refused = |(sample, voxel): (&T, &mut V)| V::of(*sample).map(|of| *voxel = of).is_none();
+    let is_refused = |(sample, voxel): (&T, &mut V::Voxel)| V::of(*sample).map(|of| *voxel = of).is_none();
     let refused = match samples.as_slice() {
         Some(samples) => samples.iter().zip(voxels).position(is_refused),
         None => samples.iter().zip(voxels).position(is_refused),

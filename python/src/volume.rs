@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use sheetsplat::appearance::{Preset, quantiles};
 use sheetsplat::glam::{DMat3, DVec3, UVec3};
 use sheetsplat::scene::{OpenVolume, VolumeSource};
-use sheetsplat::volume::{Labels, Orientation, ReadOptions};
+use sheetsplat::volume::{Labels, Orientation, ReadOptions, ValueSlice, Values};
 
 use crate::array;
 use crate::error::{self, Raised, setting};
@@ -39,6 +39,12 @@ const PERCENTILES: [(f64, &str); 9] = [
 pub(crate) struct Volume(pub(crate) OpenVolume);
 
 impl Volume {
+    /// The bytes that each value of the channels takes.
+    fn value_bytes(&self) -> Vec<usize> {
+        let channels = self.0.sample().channels();
+        channels.map(|channel| channel.values().bytes() / channel.values().len()).collect()
+    }
+
     /// The volume, which must be in memory for something.
     fn whole(&self, field: &str) -> Result<&Arc<sheetsplat::Volume>, Raised> {
         match &self.0 {
@@ -88,11 +94,11 @@ pub(crate) fn reading(
     Ok(options)
 }
 
-/// Checks the sizes of an array `[z, y, x]`, with some channels and maybe labels, before it is made.
+/// Checks the sizes of an array `[z, y, x]`, with some channels, of which each value takes some bytes, and maybe labels, before it is made.
 #[pyfunction]
-pub(crate) fn check_sizes(shape: Vec<usize>, channels: usize, labels: bool, memory: Option<&str>) -> PyResult<()> {
+pub(crate) fn check_sizes(shape: Vec<usize>, channels: Vec<usize>, labels: bool, memory: Option<&str>) -> PyResult<()> {
     let limit = reading(memory, None, None)?.memory_limit();
-    Ok(array::Sizes::of(&shape)?.check(channels, labels, limit)?)
+    Ok(array::Sizes::of(&shape)?.check(&channels, labels, limit)?)
 }
 
 #[pymethods]
@@ -110,16 +116,17 @@ impl Volume {
         memory: Option<&str>,
     ) -> PyResult<Self> {
         let limit = reading(memory, None, None)?.memory_limit();
+        let bytes = channels.iter().map(array::value_bytes).collect::<PyResult<Vec<_>>>()?;
         for channel in &channels {
-            array::sizes(channel)?.check(channels.len(), labels.is_some(), limit)?;
+            array::sizes(channel)?.check(&bytes, labels.is_some(), limit)?;
         }
         let channels = channels.iter().map(array::values).collect::<Result<Vec<_>, _>>()?;
-        let labels = labels.map(|labels| read_labels(labels, channels.len(), limit)).transpose()?;
+        let labels = labels.map(|labels| read_labels(labels, &bytes, limit)).transpose()?;
         let orientation =
             axes.map(|axes| Orientation { axes: DMat3::from_cols_array_2d(&axes), origin: origin.into() });
         let volume = py.detach(|| {
-            let channel = |(dims, values): ([u32; 3], Vec<f32>)| {
-                sheetsplat::Volume::new(ORIGIN, dims.into(), zyx(spacing), values)
+            let channel = |(dims, values): ([u32; 3], Values)| {
+                sheetsplat::Volume::from_values(ORIGIN, dims.into(), zyx(spacing), values)
             };
             let mut volumes = channels.into_iter().map(channel).collect::<Result<Vec<_>, _>>()?;
             let further = volumes.split_off(volumes.len().min(1));
@@ -147,7 +154,7 @@ impl Volume {
     ) -> PyResult<Self> {
         let mut options = reading(memory, index, bytes_read)?;
         let (spacing, labels) = changes.unwrap_or_default();
-        let labels = labels.map(|labels| read_labels(&labels, 1, options.memory_limit())).transpose()?;
+        let labels = labels.map(|labels| read_labels(&labels, &[], options.memory_limit())).transpose()?;
         if let Some((_, labels)) = &labels {
             options.memory = Some(options.memory_limit().saturating_sub(size_of_val(&**labels) as u64));
         }
@@ -182,7 +189,7 @@ impl Volume {
         memory: Option<&str>,
     ) -> PyResult<Self> {
         let limit = reading(memory, None, None)?.memory_limit();
-        let labels = labels.map(|labels| read_labels(labels, self.channels(), limit)).transpose()?;
+        let labels = labels.map(|labels| read_labels(labels, &self.value_bytes(), limit)).transpose()?;
         Ok(Self(py.detach(|| replaced(self.0.clone(), spacing, labels))?))
     }
 
@@ -198,6 +205,12 @@ impl Volume {
     fn spacing(&self) -> [f64; 3] {
         let DVec3 { x, y, z } = self.0.grid().spacing;
         [z, y, x]
+    }
+
+    /// The bytes of memory that the values of all channels take; of a volume that is streamed, those of the sample.
+    #[getter]
+    fn nbytes(&self) -> usize {
+        self.0.sample().channels().map(|channel| channel.values().bytes()).sum()
     }
 
     /// The number of channels.
@@ -234,7 +247,7 @@ impl Volume {
         let count = self.channels();
         let allowed = || error::volume("channel", &channel.to_string(), &format!("0 to {}", count - 1));
         let channel = self.whole("values")?.channels().nth(channel).ok_or_else(allowed)?;
-        PyArray1::from_slice(py, channel.values()).reshape(self.shape().map(|size| size as usize))
+        PyArray1::from_vec(py, channel.values().to_vec()).reshape(self.shape().map(|size| size as usize))
     }
 
     /// Facts about the volume, by the names of `sheetsplat info --json`; sizes and spacings are in the order z, y, x. Of one that is streamed, the values are those
@@ -284,8 +297,8 @@ type LabelArray = ([u32; 3], Arc<[u16]>);
 /// A spacing in the order z, y, x, and an array of labels, which go before a file's.
 type Changes<'py> = (Option<[f64; 3]>, Option<Bound<'py, PyAny>>);
 
-/// The labels of an array, which may take a number of bytes together with the values of some channels.
-fn read_labels(labels: &Bound<'_, PyAny>, channels: usize, limit: u64) -> Result<LabelArray, Raised> {
+/// The labels of an array, which may take a number of bytes together with the values of some channels, of which each value takes some bytes.
+fn read_labels(labels: &Bound<'_, PyAny>, channels: &[usize], limit: u64) -> Result<LabelArray, Raised> {
     array::sizes(labels)?.check(channels, true, limit)?;
     array::labels(labels)
 }
@@ -319,9 +332,9 @@ fn changed(
 }
 
 /// The minimum, maximum and mean of the values that are not NaN.
-fn extent_and_mean(values: &[f32]) -> [f64; 3] {
+fn extent_and_mean(values: ValueSlice<'_>) -> [f64; 3] {
     let start = [f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0];
-    let finite = values.iter().filter(|value| !value.is_nan()).map(|&value| f64::from(value));
+    let finite = values.iter().filter(|value| !value.is_nan()).map(f64::from);
     let [min, max, sum, count] =
         finite.fold(start, |[min, max, sum, count], value| [min.min(value), max.max(value), sum + value, count + 1.0]);
     [min, max, sum / count]

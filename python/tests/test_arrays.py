@@ -59,7 +59,7 @@ def test_memory_counts_channels_and_labels() -> None:
     refused("memory", stack, channel_axis=0, labels=labels, memory=1679)
     assert Volume(stack, channel_axis=0, labels=labels, memory=1680).channels == 3
     # A volume's labels, and those beside a path or a builtin volume.
-    refused("memory", Volume(values), labels=labels, memory=719)
+    refused("memory", Volume(values), labels=labels, memory=359)
     with pytest.raises(VolumeError, match="memory limit of 10 bytes"):
         Volume("builtin:cube:4", memory=10)
     with pytest.raises(VolumeError, match="memory limit"):
@@ -69,6 +69,40 @@ def test_memory_counts_channels_and_labels() -> None:
         sheetsplat.render(values, memory=100)
     with pytest.raises(sheetsplat.SceneError, match="memory: found \"much\""):
         Volume(values, memory="much")
+
+
+@pytest.mark.parametrize(("dtype", "bytes"), [("u1", 1), ("i1", 1), ("?", 1), ("u2", 2), (">i2", 2), ("i4", 4), ("f2", 4), ("f8", 4)])
+def test_memory_counts_the_bits_of_values(dtype: str, bytes: int) -> None:
+    values = np.zeros((4, 5, 6), dtype)
+    values[1, 2, 3] = 1
+    labels = np.zeros(values.shape, np.uint8)
+    assert Volume(values, memory=120 * bytes).shape == (4, 5, 6)
+    error = refused("memory", values, memory=120 * bytes - 1)
+    assert f"4×5×6 voxels, which take {120 * bytes} bytes" in str(error)
+    # Whatever the type, these are whole numbers of 8 bits, and labels beside them need no more than 2 bytes each.
+    assert Volume(values).nbytes == 120
+    assert Volume(Volume(values), labels=labels, memory=360).nbytes == 120
+    refused("memory", Volume(values), labels=labels, memory=359)
+    assert Volume(np.stack([values] * 3), channel_axis=0, memory=360 * bytes).nbytes == 360
+    refused("memory", np.stack([values] * 3), channel_axis=0, memory=360 * bytes - 1)
+
+
+@pytest.mark.parametrize("dtype", ["u1", "i1", "u2", "i2", "f4"])
+def test_strides_and_values_of_few_bits(dtype: str) -> None:
+    values = voxels(dtype)
+    values[0, 0, 0] = 127
+    for array in (values, values.transpose(2, 0, 1)[::-1, ::2, ::-3], np.asfortranarray(values), values[:, 1:5, 2:]):
+        array = array.view()
+        array.flags.writeable = False
+        volume = Volume(array)
+        assert volume.values.dtype == np.float32
+        np.testing.assert_array_equal(volume.values, array.astype(np.float32))
+        assert volume.nbytes == array.size
+    wide = values.astype("i4" if np.dtype(dtype).kind != "f" else "f8")
+    wide[1, 1, 1] = 300
+    assert Volume(wide).nbytes == 2 * wide.size
+    wide[1, 1, 1] = 1 << 20
+    assert Volume(wide).nbytes == 4 * wide.size
 
 
 def test_sources_that_are_no_array_yet_are_not_computed() -> None:
@@ -203,9 +237,9 @@ def test_torch() -> None:
 
 
 @pytest.mark.skipif(not STATUS.exists(), reason="needs Linux's /proc")
-@pytest.mark.parametrize("dtype", ["f2", ">i2", "f4"])
-def test_no_second_copy(dtype: str) -> None:
-    """While a volume is made of an array, memory grows by its 4 bytes for each voxel, and by little more."""
+@pytest.mark.parametrize(("dtype", "bytes"), [("f2", 4), ("f4", 4), (">i2", 2), ("i2", 2), ("u1", 1), ("?", 1)])
+def test_no_second_copy(dtype: str, bytes: int) -> None:
+    """While a volume is made of an array, memory grows by the bytes that its own form has for each voxel, and by little more."""
     code = f"""
 import numpy as np, sheetsplat
 
@@ -216,11 +250,13 @@ values = np.ones((256, 256, 256), {dtype!r})
 sheetsplat.Volume(values[:2])
 before = peak()
 volume = sheetsplat.Volume(values, labels=values, spacing=2)
+assert volume.nbytes == values.size
 print(peak() - before)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    # 64 MiB of values and 32 of labels.
-    assert 90 < float(done.stdout) < 96 + 16, done.stdout
+    # 16 MiB for each byte of a value, and 32 of labels.
+    taken = 16 * bytes + 32
+    assert taken - 6 < float(done.stdout) < taken + 16, done.stdout
 
 
 def test_builtin_volumes_have_no_channels() -> None:

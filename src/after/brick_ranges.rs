@@ -13,7 +13,7 @@ use crate::parallel::prelude::*;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Tables, TransferFunction};
 use crate::volume::range::{EMPTY, union};
-use crate::volume::{Grid, Volume};
+use crate::volume::{Grid, ValueSlice, Volume};
 
 /// The values around a brick that bear on the image, beside those with an opacity, because of how values are composited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,14 +62,14 @@ pub struct BrickRanges {
 
 impl BrickRanges {
     /// The ranges of all voxels within `reach` of a brick along each axis.
-    pub fn new(grid: &Grid, coefficients: &[f32], reach: UVec3) -> Self {
+    pub fn new(grid: &Grid, coefficients: ValueSlice<'_>, reach: UVec3) -> Self {
         let [nx, ny, nz] = grid.dims.to_array().map(|n| n as usize);
         let bricks = grid.dims.map(|n| n.div_ceil(SIDE)).to_array().map(|n| n as usize);
         let [rx, ry, rz] = reach.to_array().map(|n| n as usize);
         // One axis after the other: the minimum over a box is the minimum over z of those over y of those over x.
         let along_x: Vec<[f32; 2]> = (coefficients.par_chunks(nx))
             .flat_map_iter(|row| {
-                around(nx, rx).map(|range| row[range].iter().fold(EMPTY, |ends, &c| union(ends, [c; 2])))
+                around(nx, rx).map(move |range| row.slice(range).iter().fold(EMPTY, |ends, c| union(ends, [c; 2])))
             })
             .collect();
         let along_y = strided(&along_x, bricks[0], ny, ry);
@@ -105,7 +105,7 @@ impl BrickRanges {
             let is_wanted = &is_wanted;
             let wanted = (0..bricks.x).filter(move |x| is_wanted((first + x) as usize));
             let voxels = wanted.flat_map(move |x| x * SIDE..((x + 1) * SIDE).min(dims.x)).map(move |x| at * dims.x + x);
-            voxels.filter(move |&voxel| !values[voxel as usize].is_nan()).collect::<Vec<u32>>()
+            voxels.filter(move |&voxel| !values.at(voxel as usize).is_nan()).collect::<Vec<u32>>()
         };
         (0..dims.y * dims.z).into_par_iter().map(row).collect::<Vec<_>>().concat()
     }
@@ -158,7 +158,7 @@ mod tests {
             |index: u32| if index % 29 == 3 { f32::NAN } else { (index.wrapping_mul(2_654_435_761) >> 20) as f32 };
         let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
         let reach = UVec3::new(2, 5, 1);
-        let ours = BrickRanges::new(&grid, &values, reach);
+        let ours = BrickRanges::new(&grid, (&values).into(), reach);
         let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
         assert_eq!(ours.ranges.len() as u32, bricks.element_product());
         for (at, &ends) in (0..).zip(&ours.ranges) {

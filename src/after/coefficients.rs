@@ -13,7 +13,7 @@ use glam::{IVec3, UVec3};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::parallel::prelude::*;
-use crate::volume::{Grid, Texel, Volume};
+use crate::volume::{Grid, Texel, ValueSlice, Volume};
 
 /// The maximum error of the field at the voxels, relative to the values' range; SPEC §9 asks for 1e-5.
 const TOLERANCE: f64 = 2e-6;
@@ -66,11 +66,11 @@ impl Solutions {
     }
 }
 
-fn fingerprint(grid: &Grid, values: &[f32], (radius, falloff): (f64, f64)) -> Fingerprint {
+fn fingerprint(grid: &Grid, values: ValueSlice<'_>, (radius, falloff): (f64, f64)) -> Fingerprint {
     let mut hasher = blake3::Hasher::new();
     grid.dims.to_array().iter().for_each(|n| _ = hasher.update(&n.to_le_bytes()));
     [radius, falloff].iter().for_each(|x| _ = hasher.update(&x.to_le_bytes()));
-    hasher.update(bytemuck::cast_slice(values));
+    values.chunks(1 << 14).for_each(|chunk| _ = hasher.update(bytemuck::cast_slice(&chunk.to_vec())));
     hasher.finalize()
 }
 
@@ -94,11 +94,11 @@ pub fn of_colors(volume: &Volume, kernel: (f64, f64)) -> Result<Option<Arc<[[f32
     let Some(texels) = volume.colors() else { return Ok(None) };
     let mut colors = vec![[0.0; 4]; texels.len()];
     for component in 0..4 {
-        let own = |(texel, value): (&Texel, &f32)| {
+        let own = |(texel, value): (&Texel, f32)| {
             if value.is_nan() { f32::NAN } else { f32::from(texel[component]) / f32::from(u16::MAX) }
         };
-        let numbers: Vec<f32> = texels.par_iter().zip(volume.values()).map(own).collect();
-        let exact = solved(volume.grid(), &numbers, kernel, &|share| {
+        let numbers: Vec<f32> = texels.par_iter().zip(volume.values().par_iter()).map(own).collect();
+        let exact = solved(volume.grid(), (&numbers).into(), kernel, &|share| {
             let percent = 25.0 * (component as f64 + share);
             log::info!(target: PROGRESS, "coefficients of the voxels' colours: {percent:.0} %");
         })?;
@@ -113,7 +113,7 @@ pub fn of_colors(volume: &Volume, kernel: (f64, f64)) -> Result<Option<Arc<[[f32
 /// As for [`exact`].
 pub fn solved(
     grid: &Grid,
-    values: &[f32],
+    values: ValueSlice<'_>,
     kernel: (f64, f64),
     progress: &dyn Fn(f64),
 ) -> Result<Arc<[f32]>, RenderError> {
@@ -138,11 +138,11 @@ pub fn solved(
 /// If the iteration does not converge, because rounding is too coarse for values whose range is tiny compared with their size.
 pub fn exact(
     grid: &Grid,
-    values: &[f32],
+    values: ValueSlice<'_>,
     (radius, falloff): (f64, f64),
     progress: &dyn Fn(f64),
 ) -> Result<Vec<f32>, RenderError> {
-    let ends = values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], &v| [min.min(v), max.max(v)]);
+    let ends = values.iter().fold([f32::INFINITY, f32::NEG_INFINITY], |[min, max], v| [min.min(v), max.max(v)]);
     let [min, max] = ends.map(f64::from);
     if radius <= 1.0 || min >= max || min > max {
         // Each voxel is alone in its kernel, or all values are equal, or there are only holes.
@@ -151,7 +151,7 @@ pub fn exact(
     }
     // The coefficients of a constant are that constant, so values can be shifted to around 0, where rounding is finest.
     let middle = ((min + max) / 2.0) as f32;
-    let has_holes = values.iter().any(|value| value.is_nan());
+    let has_holes = values.iter().any(f32::is_nan);
     let moved = if CUBE.contains(&radius) && !has_holes {
         along_axes(grid.dims, values, middle, falloff, progress)
     } else {
@@ -163,11 +163,15 @@ pub fn exact(
         })?
     };
     progress(1.0);
-    Ok(moved.into_par_iter().zip(values).map(|(c, value)| if value.is_nan() { f32::NAN } else { c + middle }).collect())
+    Ok(moved
+        .into_par_iter()
+        .zip(values.par_iter())
+        .map(|(c, value)| if value.is_nan() { f32::NAN } else { c + middle })
+        .collect())
 }
 
 /// The solution if G is a product: `N·v`, then one axis after the other.
-fn along_axes(dims: UVec3, values: &[f32], middle: f32, falloff: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
+fn along_axes(dims: UVec3, values: ValueSlice<'_>, middle: f32, falloff: f64, progress: &dyn Fn(f64)) -> Vec<f32> {
     let neighbour = libm::exp(-falloff);
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     let filters = [nx, ny, nz].map(|n| Sweeps::new(n, neighbour));
@@ -233,7 +237,7 @@ impl Sweeps {
 /// Hestenes and Stiefel's method (1952): G is symmetric, and the settings ensure that it is positive definite. `None` if it does not converge.
 fn conjugate_gradients(
     grid: &Grid,
-    values: &[f32],
+    values: ValueSlice<'_>,
     middle: f32,
     taps: &Taps,
     tolerance: f64,
@@ -341,7 +345,7 @@ mod tests {
             };
             let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
             for kernel in [(2.0, 2.0), (2.0, 1.0), (1.8, 1.0), (1.5, 2.0), (3.0, 1.5), (1.0, 2.0)] {
-                let ours = exact(&grid, &values, kernel, &|_| {}).unwrap();
+                let ours = exact(&grid, (&values).into(), kernel, &|_| {}).unwrap();
                 let in_f64: Vec<f64> = values.iter().map(|&value| value.into()).collect();
                 let expected = twin(&grid, &in_f64, kernel.0, kernel.1).unwrap();
                 for (ours, expected) in ours.iter().zip(expected) {
@@ -373,7 +377,7 @@ mod tests {
                 noise => noise as f32 * 16.0 - 1000.0,
             };
             let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
-            let coefficients = exact(&grid, &values, kernel, &|_| {}).unwrap();
+            let coefficients = exact(&grid, (&values).into(), kernel, &|_| {}).unwrap();
             let (radius, falloff) = kernel;
             let mut worst = 0.0_f64;
             for (index, &value) in (0..).zip(&values).filter(|(_, value)| !value.is_nan()) {
@@ -401,7 +405,7 @@ mod tests {
         let values: Vec<f32> = (0..210).map(|index| ((index * 31) % 17) as f32).collect();
         let solve = |values: &[f32], kernel| {
             let steps = std::cell::Cell::new(0);
-            let solution = solved(&grid, values, kernel, &|share| {
+            let solution = solved(&grid, values.into(), kernel, &|share| {
                 steps.set(steps.get() + 1);
                 assert!(share <= 1.0);
             });

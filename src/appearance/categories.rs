@@ -30,7 +30,7 @@ pub fn values(volume: &Volume) -> Option<Vec<u16>> {
 /// The labels of [`values`], each with its number of voxels.
 fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
     let values = volume.values();
-    if !values.par_iter().all(|&value| f32::from(value as u16) == value || value.is_nan()) {
+    if !values.par_iter().all(|value| f32::from(value as u16) == value || value.is_nan()) {
         return None;
     }
     let counts = histogram(values, 1 << 16, |value| Some(usize::from(value as u16)));
@@ -80,14 +80,14 @@ impl Borders {
             let mut borders = Self::default();
             for x in 0..nx {
                 let at = row * nx + x;
-                if values[at].is_nan() {
+                if values.at(at).is_nan() {
                     continue;
                 }
                 for ((step, count), place) in steps.into_iter().zip([x, row % ny, row / ny]) {
                     if place + 1 == count {
                         continue;
                     }
-                    let [here, next] = [values[at], values[at + step]];
+                    let [here, next] = [values.at(at), values.at(at + step)];
                     if next.is_nan() {
                         continue;
                     }
@@ -95,9 +95,9 @@ impl Borders {
                         borders.pairs[0] += 1;
                         borders.pairs[1] += u64::from(here == next);
                     }
-                    if place > 0 && !values[at - step].is_nan() && values[at - step] != next {
+                    if place > 0 && !values.at(at - step).is_nan() && values.at(at - step) != next {
                         borders.between[0] += 1;
-                        borders.between[1] += u64::from(here != next && here != values[at - step]);
+                        borders.between[1] += u64::from(here != next && here != values.at(at - step));
                     }
                 }
             }

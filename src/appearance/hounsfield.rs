@@ -3,6 +3,7 @@
 use super::object::Object;
 use super::padding::AIR;
 use super::quantile::quantiles;
+use crate::volume::ValueSlice;
 
 /// The offset of Hounsfield units that are stored as unsigned numbers.
 const OFFSET: f64 = 1024.0;
@@ -15,7 +16,7 @@ const UNSIGNED_GREATEST: std::ops::RangeInclusive<f64> = 1500.0..=8191.0;
 
 /// The offset of values that may be Hounsfield units: 0 if one in a thousand is below -100, or else 1024 if the maximum lies within 1500
 /// to 8191.
-pub(super) fn offset_of(values: &[f32]) -> Option<f64> {
+pub(super) fn offset_of(values: ValueSlice<'_>) -> Option<f64> {
     // A quantile is used because a filter's undershoot may lie below the units.
     let [least, greatest] = quantiles(values, |_| true, [0.001, 1.0]).unwrap_or_default().map(f64::from);
     match least < SIGNED_BELOW {
@@ -36,7 +37,7 @@ pub(super) struct Hounsfield {
 impl Hounsfield {
     /// Values with an offset (see [`offset_of`]), or else a fit: the background is assumed to be air (-1000), and the object's faintest
     /// eighth water (0).
-    pub(super) fn of(values: &[f32]) -> Self {
+    pub(super) fn of(values: ValueSlice<'_>) -> Self {
         if let Some(water) = offset_of(values) {
             return Self { water, per_unit: 1.0 };
         }

@@ -4,6 +4,7 @@ use super::padding::{AIR, is_padded};
 use super::quantile::quantiles;
 use crate::parallel::prelude::*;
 use crate::settings::transfer_function::Ramp;
+use crate::volume::ValueSlice;
 
 const BINS: usize = 256;
 
@@ -26,17 +27,17 @@ pub(super) struct Object {
 
 impl Object {
     /// The levels for the finite values; `None` if these are all equal.
-    pub(super) fn find(values: &[f32]) -> Option<Self> {
+    pub(super) fn find(values: ValueSlice<'_>) -> Option<Self> {
         let [lo, hi] = ends(values)?;
         let (start, range) = (f64::from(lo), f64::from(hi) - f64::from(lo));
         let bin = |value: f32| (f64::from(value) - start) / range * BINS as f64;
         let counted = values.par_chunks(CHUNK).map(|chunk| {
             let (mut counts, mut least_count) = ([0.0; BINS], 0.0);
-            for &value in chunk.iter().filter(|value| !value.is_nan()) {
+            chunk.iter().filter(|value| !value.is_nan()).for_each(|value| {
                 // Values below the first bin count in it.
                 counts[(bin(value) as usize).min(BINS - 1)] += 1.0;
                 least_count += if value <= lo { 1.0 } else { 0.0 };
-            }
+            });
             (counts, least_count)
         });
         let (mut counts, least_count) = counted.reduce(
@@ -84,10 +85,10 @@ impl Object {
 }
 
 /// The range of the histogram; `None` if all values are equal.
-fn ends(values: &[f32]) -> Option<[f32; 2]> {
+fn ends(values: ValueSlice<'_>) -> Option<[f32; 2]> {
     // `f32::min` and `f32::max` ignore holes (NaN).
     let widen = |(lo, hi): (f32, f32), (a, b): (f32, f32)| (lo.min(a), hi.max(b));
-    let extent = values.par_iter().map(|&value| (value, value));
+    let extent = values.par_iter().map(|value| (value, value));
     let (least, greatest) = extent.reduce(|| (f32::INFINITY, f32::NEG_INFINITY), widen);
     if least >= greatest {
         return None;

@@ -11,7 +11,7 @@ use crate::parallel::prelude::*;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::{Ramp, TransferFunction};
-use crate::volume::Volume;
+use crate::volume::{ValueSlice, Volume};
 
 /// A kind of data, and which part of it is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -144,7 +144,7 @@ impl Preset {
     }
 }
 
-fn ct(values: &[f32], color: &Points<[f64; 3]>, opacity: &Points<f64>) -> TransferFunction {
+fn ct(values: ValueSlice<'_>, color: &Points<[f64; 3]>, opacity: &Points<f64>) -> TransferFunction {
     let scale = Hounsfield::of(values);
     let color = color.iter().map(|&(units, rgb)| (scale.value(units), DVec3::from(rgb))).collect();
     let opacity = opacity.iter().map(|&(units, opacity)| (scale.value(units), opacity)).collect();
@@ -203,7 +203,7 @@ pub(super) fn translucent_labels() -> Ramp<f64> {
 }
 
 /// White, with an opacity that rises from the background to a value that few voxels exceed.
-fn mip(values: &[f32], object: &Object) -> TransferFunction {
+fn mip(values: ValueSlice<'_>, object: &Object) -> TransferFunction {
     const TAIL: f64 = 0.0005;
     let background = object.background;
     let top = quantiles(values, |value| f64::from(value) > background, [1.0 - TAIL]);
@@ -227,7 +227,7 @@ pub(super) fn confocal_of_several(volume: &Volume) -> TransferFunction {
     const STEPS: f64 = 65536.0;
     haze(volume, |[start, top]| {
         let share = |value: f32| ((f64::from(value) - start) / (top - start)).clamp(0.0, 1.0);
-        let sum: u64 = volume.values().par_iter().map(|&value| (share(value) * STEPS) as u64).sum();
+        let sum: u64 = volume.values().par_iter().map(|value| (share(value) * STEPS) as u64).sum();
         let mean = sum as f64 / STEPS / (volume.values().len() as u64 - volume.holes()) as f64;
         (DEPTH / (mean * extent(volume))).min(MOST)
     })

@@ -2,6 +2,7 @@
 
 use crate::lists::iso_range::{of_ordinal, ordinal};
 use crate::parallel::prelude::*;
+use crate::volume::ValueSlice;
 
 /// The number of values that one thread counts at a time.
 const CHUNK: usize = 1 << 20;
@@ -9,7 +10,7 @@ const CHUNK: usize = 1 << 20;
 /// The quantiles of the values for which the predicate holds, at the given fractions in [0, 1]; `None` if it holds for none. Holes are
 /// ignored.
 pub fn quantiles<const N: usize>(
-    values: &[f32],
+    values: ValueSlice<'_>,
     counts: impl Fn(f32) -> bool + Sync,
     shares: [f64; N],
 ) -> Option<[f32; N]> {
@@ -34,12 +35,10 @@ pub fn quantiles<const N: usize>(
 }
 
 /// The number of values in each bin. Values for which `bin` is `None`, and holes (NaN), are in no bin.
-pub fn histogram(values: &[f32], bins: usize, bin: impl Fn(f32) -> Option<usize> + Sync) -> Vec<u64> {
+pub fn histogram(values: ValueSlice<'_>, bins: usize, bin: impl Fn(f32) -> Option<usize> + Sync) -> Vec<u64> {
     let zeros = || vec![0_u64; bins];
     let counted = values.par_chunks(CHUNK).fold(zeros, |mut counts, chunk| {
-        for bin in chunk.iter().filter(|value| !value.is_nan()).filter_map(|&value| bin(value)) {
-            counts[bin] += 1;
-        }
+        chunk.iter().filter(|value| !value.is_nan()).filter_map(&bin).for_each(|bin| counts[bin] += 1);
         counts
     });
     counted.reduce(zeros, |a, b| a.iter().zip(b).map(|(a, b)| a + b).collect())
@@ -68,23 +67,23 @@ mod tests {
         sorted.sort_by(f32::total_cmp);
         for share in [0.0, 0.001, 0.25, 0.5, 0.77, 0.9999, 1.0] {
             let expected = sorted[(share * (sorted.len() - 1) as f64).round() as usize];
-            assert_eq!(quantiles(&values, |_| true, [share]), Some([expected]), "{share}");
+            assert_eq!(quantiles((&values).into(), |_| true, [share]), Some([expected]), "{share}");
         }
         let positive: Vec<f32> = sorted.into_iter().filter(|&value| value > 5.0).collect();
-        assert_eq!(quantiles(&values, |value| value > 5.0, [1.0, 0.0]), Some([f32::MAX, positive[0]]));
-        assert_eq!(quantiles(&values, |_| false, [0.5]), None);
-        assert_eq!(quantiles(&[], |_| true, [0.5]), None);
+        assert_eq!(quantiles((&values).into(), |value| value > 5.0, [1.0, 0.0]), Some([f32::MAX, positive[0]]));
+        assert_eq!(quantiles((&values).into(), |_| false, [0.5]), None);
+        assert_eq!(quantiles(ValueSlice::F32(&[]), |_| true, [0.5]), None);
         // Only finite values count.
         assert_eq!(
-            quantiles(&[f32::NAN, 3.0, f32::NAN, 1.0, 2.0, f32::NAN], |_| true, [0.0, 0.5, 1.0]),
+            quantiles(ValueSlice::F32(&[f32::NAN, 3.0, f32::NAN, 1.0, 2.0, f32::NAN]), |_| true, [0.0, 0.5, 1.0]),
             Some([1.0, 2.0, 3.0])
         );
-        assert_eq!(quantiles(&[f32::NAN], |_| true, [0.5]), None);
+        assert_eq!(quantiles(ValueSlice::F32(&[f32::NAN]), |_| true, [0.5]), None);
     }
 
     #[test]
     fn neighbours_far_from_the_origin_are_told_apart() {
         let values: Vec<f32> = (0..100_u32).map(|at| (1_000_000 + at) as f32).collect();
-        assert_eq!(quantiles(&values, |_| true, [0.5]), Some([1_000_050.0]));
+        assert_eq!(quantiles((&values).into(), |_| true, [0.5]), Some([1_000_050.0]));
     }
 }

@@ -6,7 +6,7 @@ use super::object::Object;
 use super::preset::Preset;
 use super::quantile::quantiles;
 use crate::parallel::prelude::*;
-use crate::volume::Volume;
+use crate::volume::{ValueSlice, Volume};
 
 /// Hounsfield units of air, of soft tissue, and of everything denser than lungs.
 const AIR: [f64; 2] = [-1100.0, -850.0];
@@ -47,9 +47,9 @@ impl Preset {
 }
 
 /// Whether values minus an offset are Hounsfield units of a body in air (`None` if not), and if so, whether there is bone.
-fn is_ct(values: &[f32], offset: f64) -> Option<bool> {
+fn is_ct(values: ValueSlice<'_>, offset: f64) -> Option<bool> {
     let count = |[low, high]: [f64; 2]| {
-        let is_in = |value: &&f32| (low..=high).contains(&(f64::from(**value) - offset));
+        let is_in = |value: &f32| (low..=high).contains(&(f64::from(*value) - offset));
         values.par_iter().filter(is_in).count() as f64
     };
     let body = count(BODY);
@@ -68,6 +68,6 @@ fn is_head(volume: &Volume) -> bool {
         && is_positive()
         && Object::find(values).is_some_and(|object| {
             let threshold = object.threshold() as f32;
-            values.par_iter().filter(|&&value| value > threshold).count() * 10 >= values.len() * 3
+            values.par_iter().filter(|&value| value > threshold).count() * 10 >= values.len() * 3
         })
 }

@@ -174,13 +174,17 @@ mod tests {
     use crate::scene::VolumeSource;
     use crate::settings::splatting::Interpolation;
     use crate::settings::transfer_function::Ramp;
+    use crate::volume::ValueSlice;
 
     /// Where what voxels are drawn from lies in memory.
     fn list_of(renderer: &CpuRenderer) -> *const () {
         let layer = &renderer.layers[0];
         match &layer.list {
             List::Before(bricks, _) => bricks.bricks().as_ptr().cast(),
-            List::After(coefficients) => coefficients[0].all(&layer.volume).as_ptr().cast(),
+            List::After(coefficients) => match coefficients[0].all(&layer.volume) {
+                ValueSlice::F32(all) => all.as_ptr().cast(),
+                values => panic!("{values:?} are no coefficients"),
+            },
         }
     }
 

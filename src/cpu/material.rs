@@ -88,7 +88,7 @@ impl Material {
     /// The material of a voxel in a channel. A hole has no opacity.
     pub(super) fn of(volume: &Volume, transfer: &TransferFunction, voxel: UVec3) -> Self {
         let index = volume.grid().index_of(voxel);
-        let value = f64::from(volume.values()[index as usize]);
+        let value = f64::from(volume.values().at(index as usize));
         let tables = transfer.tables(volume.label(index));
         let gradient = volume.gradient(voxel);
         let magnitude = gradient.length();

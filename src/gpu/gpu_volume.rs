@@ -13,7 +13,7 @@ use crate::gpu::fault::scoped;
 use crate::gpu::ramps::Stored;
 use crate::gpu::volume_texture::{OwnColors, ValueFormat, VolumeTexture};
 use crate::lists::value_list::ValueList;
-use crate::volume::{Texel, Volume};
+use crate::volume::{Texel, ValueSlice, Volume};
 
 /// A volume and its textures on a device. Clones share the textures.
 #[derive(Clone, Debug)]
@@ -67,10 +67,11 @@ impl GpuVolume {
     ) -> Result<Self, RenderError> {
         let volume = volume.into();
         check_count(&volume)?;
-        let all = all_values(&volume);
-        let upload = || VolumeTexture::upload_in_chunks(device, queue, &all, written);
+        let joined = joined_values(&volume);
+        let all = joined.as_ref().map_or(volume.values(), ValueSlice::from);
+        let upload = || VolumeTexture::upload_in_chunks(device, queue, all, written);
         let values = scoped(device, upload)??;
-        drop(all);
+        drop(joined);
         let colors = all_colors(&volume);
         let colors = colors.map(|colors| scoped(device, || VolumeTexture::upload_colors(device, queue, &colors)));
         let colors = colors.transpose()?.transpose()?;
@@ -90,8 +91,9 @@ impl GpuVolume {
     /// # Errors
     /// If the volume needs more layers than the device's textures have.
     pub fn estimate(device: &Device, volume: &Volume) -> Result<[u64; 2], RenderError> {
-        let values = all_values(volume);
-        estimate(device, volume, values.len(), ValueFormat::of(&values))
+        let joined = joined_values(volume);
+        let all = joined.as_ref().map_or(volume.values(), ValueSlice::from);
+        estimate(device, volume, all.len(), ValueFormat::of(all))
     }
 
     /// [`Self::estimate`] for this volume.
@@ -166,9 +168,8 @@ impl GpuVolume {
 
     /// What each channel's values are splatted as where they are classified afterwards (SPEC §9).
     pub(crate) fn numbers(&self) -> &[Normalization] {
-        let of_channel = |channel: &Volume| {
-            Normalization::of(channel.values().iter().copied()).unwrap_or(Normalization::new([0.0; 2]))
-        };
+        let of_channel =
+            |channel: &Volume| Normalization::of(channel.values().iter()).unwrap_or(Normalization::new([0.0; 2]));
         self.shared.numbers.get_or_init(|| self.shared.volume.channels().map(of_channel).collect())
     }
 
@@ -226,9 +227,10 @@ fn check_count(volume: &Volume) -> Result<(), SettingError> {
     Ok(())
 }
 
-/// The values of all channels, one channel after the other.
-fn all_values(volume: &Volume) -> Cow<'_, [f32]> {
-    one_after_the_other(volume.channels().map(Volume::values)).unwrap_or_default()
+/// The values of all channels, one channel after the other, if there are several.
+fn joined_values(volume: &Volume) -> Option<Vec<f32>> {
+    let are_several = !volume.further().is_empty();
+    are_several.then(|| volume.channels().flat_map(Volume::values).collect())
 }
 
 /// The colours of the channels whose voxels have their own.

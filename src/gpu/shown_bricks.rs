@@ -8,7 +8,7 @@ use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::gpu::coefficients::Coefficients;
 use crate::lists::classify::channels;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::Volume;
+use crate::volume::{ValueSlice, Volume};
 
 /// The bricks that may be drawn where values are classified after splatting (SPEC §9).
 #[derive(Debug)]
@@ -51,7 +51,7 @@ impl PartialEq for BrickNeeds {
 impl ShownBricks {
     pub(super) fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
         let of_channel = |(number, (channel, transfer)): (usize, (&Volume, &TransferFunction))| {
-            let exact = needs.coefficients.as_ref().map(|all| &*all[number].values);
+            let exact = needs.coefficients.as_ref().map(|all| ValueSlice::from(&*all[number].values));
             let ranges = BrickRanges::new(channel.grid(), exact.unwrap_or(channel.values()), needs.reach);
             ShownInChannel { are_shown: ranges.shown(channel, transfer, needs.bearing), ranges }
         };

@@ -1,13 +1,15 @@
 //! The volume's values, labels and colours on the GPU, as texture arrays, whose size is not limited by one binding. Layers have 2048 texels a side, or
 //! 4096 or 8192 if a volume would need more layers than the device has; with WebGPU's default limits 2048 suffice.
 
+use std::ops::Range;
+
 use wgpu::{
     Device, Extent3d, Limits, Queue, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
 };
 
 use crate::error::RenderError;
 use crate::parallel::prelude::*;
-use crate::volume::Texel;
+use crate::volume::{Texel, ValueSlice};
 
 /// The smallest of [`SIDES`].
 pub const LEAST_SIDE: u32 = 2048;
@@ -28,11 +30,9 @@ pub enum ValueFormat {
 
 impl ValueFormat {
     /// The format with the fewest bits for these values. Examines all of them.
-    pub fn of(values: &[f32]) -> Self {
-        let ranges = values.par_chunks(1 << 16).map(whole_range);
-        let range = ranges.try_reduce(|| [i32::MAX, i32::MIN], |a, b| Some([a[0].min(b[0]), a[1].max(b[1])]));
+    pub fn of(values: ValueSlice<'_>) -> Self {
         // Up to this limit `f32` represents every whole number, so neither the difference nor the sum is rounded.
-        let range = range.filter(|ends| ends.iter().all(|end| end.unsigned_abs() <= 1 << 24));
+        let range = values.whole_range().filter(|ends| ends.iter().all(|end| end.unsigned_abs() <= 1 << 24));
         match range.map(|[least, greatest]| (least as f32, greatest - least)) {
             Some((least, 0..=0xff)) => Self::Offset8(least),
             Some((least, 0x100..=0xffff)) => Self::Offset16(least),
@@ -64,17 +64,6 @@ const COLOR_BITS: TextureFormat = TextureFormat::Rgba32Uint;
 /// The format of labels, whose texels are the labels themselves.
 const LABELS: ValueFormat = ValueFormat::Offset16(0.0);
 
-/// The minimum and maximum of some values, if all are whole numbers. `-0.0` does not count, because a whole number would restore `0.0`.
-fn whole_range(values: &[f32]) -> Option<[i32; 2]> {
-    let (mut least, mut greatest, mut are_whole) = (i32::MAX, i32::MIN, true);
-    for &value in values {
-        let whole = value as i32;
-        are_whole &= (whole as f32).to_bits() == value.to_bits();
-        (least, greatest) = (least.min(whole), greatest.max(whole));
-    }
-    are_whole.then_some([least, greatest])
-}
-
 /// One number per voxel, x fastest, folded into square layers whose side is a power of two: voxel i is texel i mod side of row ⌊i/side⌋.
 /// `shaders/shared/volume.wgsl` unfolds it.
 #[derive(Debug)]
@@ -92,7 +81,7 @@ impl VolumeTexture {
     ///
     /// # Errors
     /// If they need more layers than the device's textures have.
-    pub fn upload(device: &Device, queue: &Queue, values: &[f32]) -> Result<Self, RenderError> {
+    pub fn upload(device: &Device, queue: &Queue, values: ValueSlice<'_>) -> Result<Self, RenderError> {
         Self::upload_in_chunks(device, queue, values, &|| {})
     }
 
@@ -103,7 +92,7 @@ impl VolumeTexture {
     pub fn upload_in_chunks(
         device: &Device,
         queue: &Queue,
-        values: &[f32],
+        values: ValueSlice<'_>,
         written: &dyn Fn(),
     ) -> Result<Self, RenderError> {
         let side = side(&device.limits(), "the volume's values", values.len() as u64)?;
@@ -118,7 +107,7 @@ impl VolumeTexture {
         let side = side(&device.limits(), "the volume's coefficients", numbers.len() as u64)?;
         let size = folded(numbers.len() as u64, side);
         let (texture, uploaded) = Self::new(device, "sheetsplat.coefficients", ValueFormat::Bits, size);
-        fill(queue, &texture, numbers, f32::to_bits, &|| {});
+        fill_from(queue, &texture, numbers, f32::to_bits);
         Ok(uploaded)
     }
 
@@ -131,7 +120,7 @@ impl VolumeTexture {
         let size = folded(numbers.len() as u64, side);
         let (texture, uploaded) =
             Self::new_as(device, "sheetsplat.color_coefficients", ValueFormat::Bits, COLOR_BITS, size);
-        fill(queue, &texture, numbers, |color| color.map(f32::to_bits), &|| {});
+        fill_from(queue, &texture, numbers, |color| color.map(f32::to_bits));
         Ok(uploaded)
     }
 
@@ -145,17 +134,46 @@ impl VolumeTexture {
     }
 
     /// Like [`Self::upload`], with layers of a given side, necessary or not.
-    pub fn upload_folded(device: &Device, queue: &Queue, values: &[f32], side: u32) -> Self {
+    pub fn upload_folded(device: &Device, queue: &Queue, values: ValueSlice<'_>, side: u32) -> Self {
         Self::fold(device, queue, values, side, &|| {})
     }
 
-    fn fold(device: &Device, queue: &Queue, values: &[f32], side: u32, written: &dyn Fn()) -> Self {
+    fn fold(device: &Device, queue: &Queue, values: ValueSlice<'_>, side: u32, written: &dyn Fn()) -> Self {
         let format = ValueFormat::of(values);
         let (texture, uploaded) = Self::new(device, "sheetsplat.values", format, folded(values.len() as u64, side));
+        let count = values.len();
+        let some = |range| values.slice(range).iter();
         match format {
-            ValueFormat::Offset8(least) => fill(queue, &texture, values, |value| (value - least) as u8, written),
-            ValueFormat::Offset16(least) => fill(queue, &texture, values, |value| (value - least) as u16, written),
-            ValueFormat::Bits => fill(queue, &texture, values, f32::to_bits, written),
+            ValueFormat::Offset8(least) => {
+                let append = |texels: &mut Vec<u8>, value: f32| texels.push((value - least) as u8);
+                fill(
+                    queue,
+                    &texture,
+                    count,
+                    |texels, range| some(range).for_each(|value| append(texels, value)),
+                    written,
+                );
+            }
+            ValueFormat::Offset16(least) => {
+                let append = |texels: &mut Vec<u16>, value: f32| texels.push((value - least) as u16);
+                fill(
+                    queue,
+                    &texture,
+                    count,
+                    |texels, range| some(range).for_each(|value| append(texels, value)),
+                    written,
+                );
+            }
+            ValueFormat::Bits => {
+                let append = |texels: &mut Vec<u32>, value: f32| texels.push(value.to_bits());
+                fill(
+                    queue,
+                    &texture,
+                    count,
+                    |texels, range| some(range).for_each(|value| append(texels, value)),
+                    written,
+                );
+            }
         }
         uploaded
     }
@@ -167,7 +185,7 @@ impl VolumeTexture {
     pub fn upload_labels(device: &Device, queue: &Queue, labels: &[u16]) -> Result<Self, RenderError> {
         let side = side(&device.limits(), "the volume's labels", labels.len() as u64)?;
         let (texture, uploaded) = Self::new(device, "sheetsplat.labels", LABELS, folded(labels.len() as u64, side));
-        fill(queue, &texture, labels, |label| label, &|| {});
+        fill_from(queue, &texture, labels, |label| label);
         Ok(uploaded)
     }
 
@@ -182,11 +200,11 @@ impl VolumeTexture {
         let (texture, uploaded) = Self::new_as(device, "sheetsplat.colors", ValueFormat::Bits, format, size);
         let full = match format {
             TextureFormat::Rgba8Uint => {
-                fill(queue, &texture, colors, |texel| texel.map(|number| (number / BYTE) as u8), &|| {});
+                fill_from(queue, &texture, colors, |texel| texel.map(|number| (number / BYTE) as u8));
                 u32::from(u8::MAX)
             }
             _ => {
-                fill(queue, &texture, colors, |texel| texel, &|| {});
+                fill_from(queue, &texture, colors, |texel| texel);
                 u32::from(u16::MAX)
             }
         };
@@ -263,13 +281,13 @@ fn color_format(colors: &[Texel]) -> TextureFormat {
 /// The number of values converted and sent at a time: whole rows of a layer, whatever its side.
 const CHUNK: usize = (LEAST_SIDE * LEAST_SIDE) as usize;
 
-/// Writes a texel for every value, chunk by chunk. There is never a second volume in memory, except for the queue's own copies of what is
+/// Writes a number of texels, chunk by chunk; `append` appends those of a range. There is never a second volume in memory, except for the queue's own copies of what is
 /// not submitted yet.
-fn fill<V: Copy, T: bytemuck::NoUninit>(
+fn fill<T: bytemuck::NoUninit>(
     queue: &Queue,
     texture: &wgpu::Texture,
-    values: &[V],
-    texel: impl Fn(V) -> T,
+    count: usize,
+    append: impl Fn(&mut Vec<T>, Range<usize>),
     written: &dyn Fn(),
 ) {
     let side = texture.width();
@@ -287,11 +305,11 @@ fn fill<V: Copy, T: bytemuck::NoUninit>(
             Extent3d { width, height, depth_or_array_layers: 1 },
         );
     };
-    let mut texels = Vec::with_capacity(CHUNK.min(values.len()));
-    for (chunk, values) in (0..).zip(values.chunks(CHUNK)) {
+    let mut texels = Vec::with_capacity(CHUNK.min(count));
+    for first in (0..count).step_by(CHUNK) {
         texels.clear();
-        texels.extend(values.iter().map(|&value| texel(value)));
-        let row = chunk * (CHUNK as u32 / side);
+        append(&mut texels, first..(first + CHUNK).min(count));
+        let row = (first / side as usize) as u32;
         let (whole, rest) = texels.split_at(texels.len() / side as usize * side as usize);
         if !whole.is_empty() {
             write(whole, side, row);
@@ -301,6 +319,18 @@ fn fill<V: Copy, T: bytemuck::NoUninit>(
         }
         written();
     }
+}
+
+/// Writes a texel for each of some numbers.
+fn fill_from<V: Copy, T: bytemuck::NoUninit>(
+    queue: &Queue,
+    texture: &wgpu::Texture,
+    numbers: &[V],
+    texel: impl Fn(V) -> T,
+) {
+    let append =
+        |texels: &mut Vec<T>, range: Range<usize>| texels.extend(numbers[range].iter().map(|&number| texel(number)));
+    fill(queue, texture, numbers.len(), append, &|| {});
 }
 
 /// The smallest side with which the device has enough layers for `voxels` voxels.

@@ -76,7 +76,7 @@ impl Image {
         if array.kind != crate::volume::SampleType::F32 {
             return Err(content(path, "descr", array.kind.to_string(), "float32".to_owned()));
         }
-        Ok(Self { width, height, pixels: array.values.as_chunks().0.to_vec() })
+        Ok(Self { width, height, pixels: array.values.as_slice().chunks(4).map(|pixel| pixel.run(0)).collect() })
     }
 }
 

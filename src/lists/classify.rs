@@ -37,7 +37,7 @@ pub fn takes_part(volume: &Volume, transfer: &TransferFunction, index: u32) -> b
 
 /// Whether a voxel takes part in one channel.
 fn takes_part_in(volume: &Volume, transfer: &TransferFunction, index: u32) -> bool {
-    let value = f64::from(volume.values()[index as usize]);
+    let value = f64::from(volume.values().at(index as usize));
     let tables = transfer.tables(volume.label(index));
     // Most voxels are excluded by their value, and without gradient opacity the value decides: the gradient is computed only if needed.
     let may_take_part =

@@ -32,7 +32,7 @@ pub(crate) fn of_voxels(
                 let index = row + x;
                 let is_shown = match needs_more {
                     true => takes_part(volume, transfer, index),
-                    false => set.contains(volume.values()[index as usize]),
+                    false => set.contains(volume.values().at(index as usize)),
                 };
                 xs[x as usize] += u64::from(is_shown);
                 in_row += u64::from(is_shown);

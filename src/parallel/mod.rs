@@ -7,7 +7,11 @@ mod sequential;
 pub(crate) use rayon::{ThreadPool, ThreadPoolBuilder};
 #[cfg(not(target_arch = "wasm32"))]
 pub(crate) use rayon::{current_num_threads, prelude};
+#[cfg(target_arch = "wasm32")]
+pub(crate) use sequential::{Indexed, current_num_threads, prelude};
 #[cfg(all(feature = "cpu", target_arch = "wasm32"))]
 pub(crate) use sequential::{ThreadPool, ThreadPoolBuilder};
-#[cfg(target_arch = "wasm32")]
-pub(crate) use sequential::{current_num_threads, prelude};
+
+/// What a function returns for each index of a range.
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) type Indexed<F> = rayon::iter::Map<rayon::range::Iter<usize>, F>;

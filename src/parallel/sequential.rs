@@ -3,6 +3,7 @@
 
 use std::convert::Infallible;
 use std::iter::{Enumerate, Filter, FilterMap, FlatMap, Map, StepBy, Zip};
+use std::ops::Range;
 use std::slice::{Chunks, ChunksMut, Iter, IterMut};
 
 pub(crate) mod prelude {
@@ -16,6 +17,9 @@ pub(crate) fn current_num_threads() -> usize {
 /// An iterator with rayon's names. Those whose meaning is the standard library's come from [`Iterator`]; the ones here return a loop again, or take
 /// other arguments than there.
 pub(crate) struct Loop<I>(I);
+
+/// What a function returns for each index of a range.
+pub(crate) type Indexed<F> = Loop<Map<Range<usize>, F>>;
 
 impl<I: Iterator> Iterator for Loop<I> {
     type Item = I::Item;

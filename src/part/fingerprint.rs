@@ -52,7 +52,7 @@ fn add_identities(hash: &mut blake3::Hasher, volume: &StreamedVolume) {
 fn add_values(hash: &mut blake3::Hasher, volume: &Volume) {
     for channel in volume.channels() {
         for values in channel.values().chunks(1 << 14) {
-            let bytes: Vec<u8> = values.iter().flat_map(|value| bits(*value).to_le_bytes()).collect();
+            let bytes: Vec<u8> = values.iter().flat_map(|value| bits(value).to_le_bytes()).collect();
             hash.update(&bytes);
         }
         for labels in channel.labels().unwrap_or_default().chunks(1 << 14) {

@@ -72,6 +72,6 @@ pub(super) fn decode(path: &Path, access: &Access) -> Result<Decoded, ImageError
     if array.kind != SampleType::F32 {
         return Err(content(path, "descr", array.kind.to_string(), "float32".to_owned()));
     }
-    let channel = |channel: usize| array.values.iter().skip(channel).step_by(names.len()).copied().collect();
+    let channel = |channel: usize| array.values.as_slice().iter().skip(channel).step_by(names.len()).collect();
     Ok((identity, window, (0..names.len()).map(channel).collect()))
 }

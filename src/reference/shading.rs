@@ -65,7 +65,7 @@ pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geo
     let of_channel = |(volume, transfer): (&Volume, &TransferFunction)| match alpha(volume, transfer, index) {
         0.0 => DVec4::ZERO,
         alpha => {
-            let value = f64::from(volume.values()[index as usize]);
+            let value = f64::from(volume.values().at(index as usize));
             let of_value = || transfer.tables(volume.label(index)).color.at(value);
             let base = volume.color(index).map_or_else(of_value, DVec4::truncate);
             let color = color(&scene.shading, base, volume.gradient(voxel), -geometry.ray(voxel));
@@ -77,7 +77,7 @@ pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geo
 
 /// α of a voxel, times A where it has a colour of its own (SPEC §10); 0 for a hole.
 fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
-    let value = f64::from(volume.values()[index as usize]);
+    let value = f64::from(volume.values().at(index as usize));
     let tables = transfer.tables(volume.label(index));
     // Most voxels are excluded by their value, so the gradient is computed only if needed.
     if value.is_nan() || tables.opacity.at(value) <= 0.0 {

@@ -85,7 +85,7 @@ impl ReadOptions {
     /// let header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: a.raw\n";
     /// let files = [("a.nhdr", header.as_bytes()), ("a.raw", &[0, 1, 2, 3, 4, 5, 6, 7])];
     /// let volume = Volume::open_with(Path::new("a.nhdr"), &ReadOptions::default().with_files(files.into_iter().collect()))?;
-    /// assert_eq!(volume.values()[5], 5.0);
+    /// assert_eq!(volume.values().at(5), 5.0);
     /// # Ok(())
     /// # }
     /// ```

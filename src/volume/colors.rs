@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, DVec4, UVec3};
 
-use super::{SampleType, Volume, VolumeError};
+use super::{SampleType, ValueSlice, Volume, VolumeError};
 use crate::parallel::prelude::*;
 
 /// Red, green, blue and A of a voxel, each from 0 to [`u16::MAX`], which stands for 1. Numbers of 8 and 16 bits are exact.
@@ -36,11 +36,16 @@ impl Volume {
         origin: &str,
         dims: UVec3,
         spacing: DVec3,
-        (numbers, kind): (&[f32], SampleType),
+        (numbers, kind): (ValueSlice<'_>, SampleType),
     ) -> Result<Self, VolumeError> {
         let count = dims.element_product() as usize;
         let full = kind.full() as f32;
-        let color = |at| [0, 1, 2, 3].map(|component| numbers.get(component * count + at).copied().unwrap_or(full));
+        let color = |at| {
+            [0, 1, 2, 3].map(|component| {
+                let index = component * count + at;
+                if index < numbers.len() { numbers.at(index) } else { full }
+            })
+        };
         let colors: Vec<[f32; 4]> = (0..count).into_par_iter().map(color).collect();
         Self::from_colors(origin, dims, spacing, (&colors, kind))
     }
@@ -91,7 +96,7 @@ mod tests {
     fn numbers_become_shares_of_their_types_maximum() {
         let of = |kind, numbers: [f32; 4]| {
             let volume = Volume::from_colors("test", UVec3::ONE, DVec3::ONE, (&[numbers], kind)).unwrap();
-            (volume.color(0).unwrap().to_array(), volume.values()[0])
+            (volume.color(0).unwrap().to_array(), volume.values().at(0))
         };
         let (color, value) = of(SampleType::U8, [255.0, 51.0, 0.0, 102.0]);
         assert_eq!(color, [1.0, 0.2, 0.0, 0.4]);

@@ -8,6 +8,7 @@ use super::VolumeError;
 use super::access::Access;
 use super::samples::Samples;
 use super::source::{Source, invalid};
+use super::voxel::{Many, Voxel};
 
 /// The maximum width of a number in a file's name.
 const MAX_WIDTH: usize = 20;
@@ -55,20 +56,20 @@ impl DataFiles {
     }
 
     /// The samples of all files, each read by `read`. `field` is the header's field that names the files.
-    pub(super) fn read<T: Clone>(
+    pub(super) fn read<T: Voxel>(
         &self,
         header: &Path,
         field: &str,
         samples: &Samples,
         access: &Access,
-        read: impl Fn(Source, &Samples) -> Result<Vec<T>, VolumeError>,
-    ) -> Result<Vec<T>, VolumeError> {
+        read: impl Fn(Source, &Samples) -> Result<T::Many, VolumeError>,
+    ) -> Result<T::Many, VolumeError> {
         let count = self.count();
         let part = self
             .part(samples.dims, count)
             .map_err(|allowed| invalid(header, field, format!("{count} files"), allowed))?;
         let part = Samples { dims: part, ..*samples };
-        let mut values = Vec::new();
+        let mut values = T::Many::default();
         for at in 0..count {
             let name = match &self.names {
                 Names::Listed(names) => names[at as usize].clone(),
@@ -81,7 +82,7 @@ impl DataFiles {
             if count == 1 {
                 return Ok(of_file);
             }
-            values.extend_from_slice(&of_file);
+            values.append_from(&of_file, 0..of_file.count()).map_err(samples.too_many(header))?;
         }
         values.shrink_to_fit();
         Ok(values)

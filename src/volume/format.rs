@@ -6,10 +6,10 @@ use std::sync::{Arc, PoisonError};
 
 use super::access::Access;
 use super::loaded::Loaded;
-use super::samples::Voxel;
 use super::seek::FileStore;
 use super::source::invalid;
 use super::store::Store;
+use super::voxel::Voxel;
 use super::{Grid, VolumeError, folder, nrrd};
 
 type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
@@ -18,7 +18,7 @@ type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
 type FolderReader<T> = fn(&Path, &[PathBuf], &Access) -> Result<Loaded<T>, VolumeError>;
 
 /// A format and its reader.
-struct Format<T> {
+struct Format<T: Voxel> {
     name: &'static str,
     /// The extensions of its files.
     extensions: &'static [&'static str],
@@ -199,7 +199,7 @@ pub(crate) fn levels(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeEr
 }
 
 /// The format of a file or of a Zarr store; `None` if it is unknown, or for another folder.
-fn format_at<'a, T>(
+fn format_at<'a, T: Voxel>(
     formats: &'a [Format<T>],
     path: &Path,
     access: &Access,
@@ -229,7 +229,7 @@ fn is_zarr(folder: &Path, access: &Access) -> Result<bool, VolumeError> {
 }
 
 /// A file's format, and whether its first bytes determined it.
-fn format_of<'a, T>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
+fn format_of<'a, T: Voxel>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let is_named = |format: &Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
     let named = formats.iter().find(|format| is_named(format));

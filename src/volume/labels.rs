@@ -9,7 +9,7 @@ use glam::{DVec3, UVec3};
 use super::access::{Access, ReadOptions};
 use super::format;
 use super::loaded::Loaded;
-use super::samples::Voxel;
+use super::voxel::Voxel;
 use super::{Grid, Volume, VolumeError, invalid};
 
 /// Spacings whose relative difference is less than this count as equal.
@@ -49,7 +49,7 @@ impl Labels {
     }
 
     pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        let (_, loaded) = format::read(path, access)?;
+        let (_, loaded) = format::read::<u16>(path, access)?;
         loaded.check_single(path, "one: a label for every voxel")?;
         let Loaded { dims, spacing, label_names: names, values, .. } = loaded;
         Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
@@ -63,9 +63,9 @@ impl Labels {
 pub(crate) fn labels_of(
     origin: &str,
     (from, dims, step): (UVec3, UVec3, u32),
-    values: &[f32],
+    values: impl IntoIterator<Item = f32>,
 ) -> Result<Arc<[u16]>, VolumeError> {
-    let label = |(index, &value): (u32, &f32)| {
+    let label = |(index, value): (u32, f32)| {
         u16::of(value).ok_or_else(|| {
             let voxel = from + step * Grid::new(dims, DVec3::ONE).voxel_at(index);
             invalid(origin, "data", format!("{value} at voxel {voxel}"), u16::ALLOWED.to_owned())
@@ -85,8 +85,8 @@ impl Volume {
         if dims != self.dims() {
             return Err(invalid(&origin, "sizes", format!("{dims}"), format!("{}, the volume's", self.dims())));
         }
-        if values.len() != self.values.len() {
-            let (found, allowed) = (values.len(), self.values.len());
+        let (found, allowed) = (values.len(), self.values().len());
+        if found != allowed {
             return Err(invalid(&origin, "data", format!("{found} labels"), format!("{allowed} labels")));
         }
         let differs = |spacing: &DVec3| {

@@ -9,11 +9,12 @@ use super::display::ChannelDisplay;
 use super::samples::SampleType;
 use super::series::Series;
 use super::source::invalid;
+use super::voxel::{Many, Voxel};
 use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
 use crate::stats::StoreCounts;
 
 /// The contents of a file of values or labels.
-pub(crate) struct Loaded<T> {
+pub(crate) struct Loaded<T: Voxel> {
     pub(crate) dims: UVec3,
     /// The type of the samples in the file.
     pub(crate) kind: SampleType,
@@ -36,7 +37,7 @@ pub(crate) struct Loaded<T> {
     /// The levels in the file, of which the values are one.
     pub(super) levels: Option<Levels>,
     /// One value per voxel, x fastest, channel by channel.
-    pub(crate) values: Vec<T>,
+    pub(crate) values: T::Many,
 }
 
 /// The levels of a volume, and the one that is read (SPEC §13).
@@ -51,9 +52,9 @@ pub(super) struct Levels {
     pub(super) reads: StoreCounts,
 }
 
-impl<T> Loaded<T> {
+impl<T: Voxel> Loaded<T> {
     /// Values about which the file states nothing else.
-    pub(super) fn new(dims: UVec3, kind: SampleType, values: Vec<T>) -> Self {
+    pub(super) fn new(dims: UVec3, kind: SampleType, values: T::Many) -> Self {
         let (label_names, series, channel_names) = (BTreeMap::new(), Series::default(), Vec::new());
         let (spacing, unit, orientation, palette) = (None, None, None, None);
         let (displays, levels) = (Vec::new(), None);
@@ -95,7 +96,7 @@ impl<T> Loaded<T> {
     /// # Errors
     /// If they are not; `allowed` says why they must be.
     pub(super) fn check_single(&self, path: &Path, allowed: &str) -> Result<(), VolumeError> {
-        match self.values.len() / self.dims.element_product() as usize {
+        match self.values.count() / self.dims.element_product() as usize {
             1 => Ok(()),
             count => Err(invalid(path, "channels", count, allowed)),
         }

@@ -13,10 +13,11 @@ use super::data_files::DataFiles;
 use super::fields::Fields;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
-use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::source::{MAX_HEADER, Source, number, shown, three};
 use super::unit::unit;
+use super::voxel::Voxel;
 
 /// Reads one MetaImage file, or the header and the data file it names.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
@@ -32,14 +33,14 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         let bytes = samples.bytes().saturating_mul(series.count());
         let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(bytes);
         stream.skip(header_size.unwrap_or(before_the_end))?;
-        stream.series(samples, &series, false)
+        stream.series::<T>(samples, &series, false)
     };
     let values = match header.data_files(&samples)? {
         Some(files) if channels > 1 && files.count() > 1 => {
             let found = format!("{channels} in {} files", files.count());
             return Err(header.0.invalid("ElementNumberOfChannels", found, "several channels in one file"));
         }
-        Some(files) => files.read(path, "ElementDataFile", &samples, access, read)?,
+        Some(files) => files.read::<T>(path, "ElementDataFile", &samples, access, read)?,
         None => read(file, &samples)?,
     };
     let Samples { dims, kind, .. } = samples;

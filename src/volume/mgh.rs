@@ -10,9 +10,10 @@ use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::Orientation;
-use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::shear::{self, Lattice};
 use super::source::{invalid, io_error};
+use super::voxel::Voxel;
 
 /// The size of the header in bytes.
 const HEADER: u64 = 284;
@@ -58,7 +59,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let samples = Samples { kind, dims, big_endian: true, rescale: None, z_fastest: false };
     let orientation = Some(Orientation { axes: lattice.axes, origin });
     let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
-    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, stream.samples(&samples, true)?) };
+    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, stream.samples::<T>(&samples, true)?) };
     lattice.straighten(path, DIRECTIONS, loaded, access)
 }
 

@@ -47,6 +47,8 @@ mod streamed;
 #[cfg(feature = "tiff")]
 mod tiff;
 mod unit;
+mod values;
+mod voxel;
 #[cfg(feature = "vtk")]
 mod vtk;
 #[cfg(any(feature = "tiff", feature = "vtk"))]
@@ -83,17 +85,18 @@ pub use raw::RawLayout;
 pub(crate) use resample::Resampling;
 pub use sample::sample;
 pub use samples::SampleType;
-pub(crate) use samples::{SIZES, dims_of};
+pub(crate) use samples::{SIZES, Sample, dims_of};
 pub(crate) use series::Selection;
 use store::facts_of_channel;
 pub use store::{Store, StoreFacts, StoreLevel, open_raw_store, open_store};
 pub(crate) use store::{raw_store, store, stores};
 pub use streamed::{StreamedChannel, StreamedLevel, StreamedVolume};
 pub(crate) use streamed::{check_grids, sample_of_channels};
+pub(crate) use values::for_type;
+pub use values::{ValueIter, ValueSlice, Values};
 
 use crate::error::setting::SettingError;
 pub use crate::error::volume::VolumeError;
-use crate::parallel::prelude::*;
 use crate::stats::StoreCounts;
 
 /// How a file stores a volume.
@@ -121,12 +124,12 @@ fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeE
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
 ///
 /// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`, except in holes (SPEC §3), where
-/// they are NaN. A segmented volume also has a label per voxel, and a volume of colours a colour ([`Self::from_colors`]). A volume may have further
+/// they are NaN. They are kept in the fewest bits that hold every one of them ([`Values`]). A segmented volume also has a label per voxel, and a volume of colours a colour ([`Self::from_colors`]). A volume may have further
 /// channels on the same grid ([`Self::further`]).
 #[derive(Clone, Debug)]
 pub struct Volume {
     grid: Grid,
-    values: Vec<f32>,
+    values: Values,
     /// The number of NaN values.
     holes: u64,
     colors: Option<Arc<[Texel]>>,
@@ -161,36 +164,63 @@ impl PartialEq for Volume {
         let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
         facts == (grid, holes, labels, label_names, orientation, unit, encoding, palette)
             && channels == (&self.colors, &self.channel_name, &self.display, &self.further, &self.levels, &self.level)
-            && self.values.iter().zip(values).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
+            && self.values().iter().zip(values.as_slice()).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
     }
 }
 
 impl Volume {
-    /// Makes a volume from its values, x fastest. A NaN or infinite value is a hole (SPEC §3). `origin` names the volume in errors.
+    /// Makes a volume from its values, x fastest. A NaN or infinite value is a hole (SPEC §3). `origin` names the volume in errors. Of values that have 8
+    /// or 16 bits, [`Self::from_values`] makes one without a copy.
     ///
     /// # Errors
     /// If a dimension is 0, there are more than `u32::MAX` voxels, the number of values differs from the product of the dimensions, a
     /// spacing is not within [1e-100, 1e100] or is more than 10⁴ times another, or no value is finite.
-    pub fn new(origin: &str, dims: UVec3, spacing: DVec3, mut values: Vec<f32>) -> Result<Self, VolumeError> {
+    pub fn new(origin: &str, dims: UVec3, spacing: DVec3, values: Vec<f32>) -> Result<Self, VolumeError> {
+        Self::from_values(origin, dims, spacing, values)
+    }
+
+    /// Like [`Self::new`], of values of any type in which volumes keep theirs, such as a `Vec<u8>` or a `Vec<i16>`. They are taken as they are, or narrowed
+    /// if fewer bits hold them.
+    ///
+    /// ```
+    /// use sheetsplat::Volume;
+    /// use sheetsplat::glam::{DVec3, UVec3};
+    ///
+    /// let volume = Volume::from_values("ramp", UVec3::new(4, 1, 1), DVec3::ONE, vec![0_u16, 1, 2, 1000])?;
+    /// assert_eq!(volume.values(), [0.0, 1.0, 2.0, 1000.0]);
+    /// assert_eq!(volume.values().bytes(), 8);
+    /// # Ok::<(), sheetsplat::volume::VolumeError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As for [`Self::new`].
+    pub fn from_values(
+        origin: &str,
+        dims: UVec3,
+        spacing: DVec3,
+        values: impl Into<Values>,
+    ) -> Result<Self, VolumeError> {
+        let mut values: Values = values.into();
         let invalid = |field: &str, found: String, allowed: &str| invalid(origin, field, found, allowed.to_owned());
         let grid = Grid::new(dims, spacing);
         grid.check().map_err(|error| refused(origin, error))?;
         let count = dims.element_product();
-        if values.len() != count as usize {
-            return Err(invalid("data", format!("{} values", values.len()), &format!("{count} values")));
+        let found = values.as_slice().len();
+        if found != count as usize {
+            return Err(invalid("data", format!("{found} values"), &format!("{count} values")));
         }
-        let holes = punch_holes(&mut values);
+        let holes = values.punch_holes();
         if holes == u64::from(count) {
             return Err(invalid("data", "only NaN or infinite samples".to_owned(), "at least one finite sample"));
         }
-        Ok(Self { holes, ..Self::piece(grid, values) })
+        Ok(Self { holes, ..Self::piece(grid, values.narrowed()) })
     }
 
-    /// A piece of a volume, with values that are finite or NaN already.
-    pub(crate) fn piece(grid: Grid, values: Vec<f32>) -> Self {
+    /// A piece of a volume, with values that are finite or NaN already. They are kept as they are.
+    pub(crate) fn piece(grid: Grid, values: impl Into<Values>) -> Self {
         Self {
             grid,
-            values,
+            values: values.into(),
             holes: 0,
             colors: None,
             labels: None,
@@ -247,7 +277,7 @@ impl Volume {
     }
 
     pub(crate) fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        let (format, loaded) = format::read(path, access)?;
+        let (format, loaded) = format::read::<f32>(path, access)?;
         let first_channel = access.selection().channel.unwrap_or(0) as usize;
         let channels = first_channel..(loaded.series.channels as usize).max(first_channel + 1);
         let facts: Vec<StoreFacts> =
@@ -257,19 +287,19 @@ impl Volume {
         let origin = path.display().to_string();
         let spacing = spacing.unwrap_or(DVec3::ONE);
         if series.is_color {
-            let volume = Self::from_components(&origin, dims, spacing, (&values, sample_type))?;
+            let volume = Self::from_components(&origin, dims, spacing, (values.as_slice(), sample_type))?;
             let facts = facts.next().unwrap_or_default();
             return volume.stating(&origin, StoreFacts { palette: None, channel_name: None, display: None, ..facts });
         }
         // All channels' values, one after the other.
         let voxels = dims.element_product() as usize;
         let mut further = Vec::new();
-        while values.len() > voxels {
-            further.push(values.split_off(values.len() - voxels));
+        while values.as_slice().len() > voxels {
+            further.push(values.split_off(values.as_slice().len() - voxels));
         }
         values.shrink_to_fit();
-        let mut channel = |values: Vec<f32>| {
-            Self::new(&origin, dims, spacing, values)?.stating(&origin, facts.next().unwrap_or_default())
+        let mut channel = |values: Values| {
+            Self::from_values(&origin, dims, spacing, values)?.stating(&origin, facts.next().unwrap_or_default())
         };
         let mut first = channel(values)?;
         let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
@@ -348,8 +378,8 @@ impl Volume {
     }
 
     /// All values, x fastest, then y, then z. Holes are NaN.
-    pub fn values(&self) -> &[f32] {
-        &self.values
+    pub fn values(&self) -> ValueSlice<'_> {
+        self.values.as_slice()
     }
 
     /// The number of holes: voxels whose samples are NaN or infinite. They appear in no image and no statistics.
@@ -364,42 +394,35 @@ impl Volume {
     pub fn value(&self, voxel: UVec3) -> f32 {
         let dims = self.dims();
         assert!(voxel.cmplt(dims).all(), "voxel {voxel} outside {dims}");
-        self.values[(voxel.x + dims.x * (voxel.y + dims.y * voxel.z)) as usize]
+        self.values().at((voxel.x + dims.x * (voxel.y + dims.y * voxel.z)) as usize)
     }
 
     /// The gradient in value per world unit, estimated in the unwarped space (§4.2) by central differences: one-sided at the border and
     /// beside a hole, 0 along an axis without a neighbour on either side, and 0 in a hole.
     pub fn gradient(&self, voxel: UVec3) -> DVec3 {
+        for_type!(ValueSlice, self.values(), values => self.gradient_of(values, voxel))
+    }
+
+    fn gradient_of<T: Sample>(&self, values: &[T], voxel: UVec3) -> DVec3 {
+        let value = |index: usize| values[index].to_f32();
         let Grid { dims, spacing, .. } = self.grid;
         let strides = [1, dims.x as usize, dims.x as usize * dims.y as usize];
         let at: usize = (0..3).map(|axis| voxel[axis] as usize * strides[axis]).sum();
-        if self.values[at].is_nan() {
+        if value(at).is_nan() {
             return DVec3::ZERO;
         }
         let difference = |axis: usize| {
             let stride = strides[axis];
-            let has_before = voxel[axis] > 0 && !self.values[at - stride].is_nan();
-            let has_after = voxel[axis] + 1 < dims[axis] && !self.values[at + stride].is_nan();
+            let has_before = voxel[axis] > 0 && !value(at - stride).is_nan();
+            let has_after = voxel[axis] + 1 < dims[axis] && !value(at + stride).is_nan();
             let steps = u8::from(has_before) + u8::from(has_after);
             if steps == 0 {
                 return 0.0;
             }
-            let low = self.values[if has_before { at - stride } else { at }];
-            let high = self.values[if has_after { at + stride } else { at }];
+            let low = value(if has_before { at - stride } else { at });
+            let high = value(if has_after { at + stride } else { at });
             (f64::from(high) - f64::from(low)) / (f64::from(steps) * spacing[axis])
         };
         DVec3::new(difference(0), difference(1), difference(2))
     }
-}
-
-/// Replaces values that are not finite by NaN and returns their number.
-fn punch_holes(values: &mut [f32]) -> u64 {
-    let punch = |value: &mut f32| {
-        let is_hole = !value.is_finite();
-        if is_hole {
-            *value = f32::NAN;
-        }
-        u64::from(is_hole)
-    };
-    values.par_iter_mut().map(punch).sum()
 }

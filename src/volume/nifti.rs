@@ -14,10 +14,11 @@ use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::Orientation;
-use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
 use super::source::{invalid, io_error};
+use super::voxel::Voxel;
 
 /// The format's codes of data types, and the bits of each.
 const TYPES: [(i64, SampleType); 10] = [
@@ -67,9 +68,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         return Err(header.invalid("dim", format!("{:?}", header.dim), "one volume of complex samples"));
     } else if is_complex {
         log::warn!("{}: the samples are complex: the values are their magnitudes", path.display());
-        magnitudes(&header, &samples, stream, access)?
+        magnitudes::<T>(&header, &samples, stream, access)?
     } else {
-        stream.series(&samples, &series, false)?
+        stream.series::<T>(&samples, &series, false)?
     };
     let (spacing, unit) = (Some(lattice.spacing), header.unit());
     let loaded = Loaded { spacing, unit, orientation, series, ..Loaded::new(dims, kind, values) };
@@ -83,19 +84,20 @@ fn magnitudes<T: Voxel>(
     samples: &Samples,
     stream: Stream,
     access: &Access,
-) -> Result<Vec<T>, VolumeError> {
+) -> Result<T::Many, VolumeError> {
     let UVec3 { x, y, z } = samples.dims;
     let dims = dims_of([2 * u64::from(x), y.into(), z.into()])
         .ok_or_else(|| header.invalid("dim", samples.dims, "at most 2147483647 complex voxels"))?;
-    let parts: Vec<f32> = stream.samples(&Samples { dims, rescale: None, ..*samples }, false)?;
+    let parts = stream.samples::<f32>(&Samples { dims, rescale: None, ..*samples }, false)?;
     let [slope, intercept] = samples.rescale.unwrap_or([1.0, 0.0]);
     samples.reserve::<T>(&header.path, access)?;
     let mut values = Vec::new();
-    for &[real, imaginary] in parts.as_chunks().0 {
+    for pair in parts.as_slice().chunks(2) {
+        let [real, imaginary] = pair.run(0);
         let magnitude = libm::hypot(f64::from(real) * slope + intercept, f64::from(imaginary) * slope);
         values.push(T::of(magnitude).ok_or_else(|| header.invalid("data", magnitude, T::ALLOWED))?);
     }
-    Ok(values)
+    Ok(values.into())
 }
 
 /// The file's name with the ending `from`, or `from` and `.gz`, replaced by `to`; `None` if it ends otherwise. The new ending is in

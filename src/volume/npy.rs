@@ -12,9 +12,10 @@ use glam::UVec3;
 use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
-use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::source::{MAX_HEADER, invalid, shown};
+use super::voxel::Voxel;
 
 const TYPES: [(&str, SampleType); 10] = [
     ("i1", SampleType::I8),
@@ -38,7 +39,7 @@ pub(crate) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
 pub(super) fn read_array<T: Voxel>(path: &Path, mut stream: Stream) -> Result<Loaded<T>, VolumeError> {
     let (samples, series) = parse(path, &header(path, &mut stream)?)?;
     let Samples { dims, kind, .. } = samples;
-    let values = stream.series(&samples, &series, false)?;
+    let values = stream.series::<T>(&samples, &series, false)?;
     Ok(Loaded { series, ..Loaded::new(dims, kind, values) })
 }
 

@@ -8,10 +8,10 @@ use super::access::Access;
 use super::format::archive_and_inner;
 use super::loaded::Loaded;
 use super::npy;
-use super::samples::Voxel;
 use super::source::invalid;
 #[cfg(feature = "npy")]
 use super::source::shown;
+use super::voxel::Voxel;
 use super::zip::Directory;
 #[cfg(feature = "npy")]
 use super::zip::Member;

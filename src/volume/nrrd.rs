@@ -15,11 +15,12 @@ use super::fields::Fields;
 use super::loaded::Loaded;
 use super::numbers::TextEnd;
 use super::orientation::{Orientation, RAS_FROM_LPS};
-use super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
 use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};
 use super::unit;
+use super::voxel::Voxel;
 
 /// The field with the axes, which need not be at right angles.
 const DIRECTIONS: &str = "space directions";
@@ -36,10 +37,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         Some(files) if axes.series.count() > 1 && files.count() > 1 => {
             return Err(header.0.invalid("data file", format!("{} files", files.count()), "one file of four axes"));
         }
-        Some(files) => {
-            files.read(path, "data file", &layout.samples, access, |file, samples| layout.read(file, samples))?
-        }
-        None => layout.read(file, &layout.samples)?,
+        Some(files) => files
+            .read::<T>(path, "data file", &layout.samples, access, |file, samples| layout.read::<T>(file, samples))?,
+        None => layout.read::<T>(file, &layout.samples)?,
     };
     let unit = header.unit();
     let loaded = Loaded::new(dims, layout.samples.kind, values);
@@ -349,7 +349,7 @@ struct Layout {
 
 impl Layout {
     /// Reads the samples in one file.
-    fn read<T: Voxel>(&self, mut file: Source, samples: &Samples) -> Result<Vec<T>, VolumeError> {
+    fn read<T: Voxel>(&self, mut file: Source, samples: &Samples) -> Result<T::Many, VolumeError> {
         file.skip_lines(self.line_skip)?;
         if matches!(self.encoding, Encoding::Text | Encoding::Hex) {
             file.skip(self.byte_skip.unwrap_or_default())?;
@@ -360,15 +360,15 @@ impl Layout {
             #[cfg(feature = "bzip2")]
             Encoding::Bzip2 => Stream::bzip2(file),
             Encoding::Text => {
-                return Stream::text(file, samples.kind, TextEnd::File)?.series(samples, &self.series, false);
+                return Stream::text(file, samples.kind, TextEnd::File)?.series::<T>(samples, &self.series, false);
             }
-            Encoding::Hex => return Stream::hex(file)?.series(samples, &self.series, false),
+            Encoding::Hex => return Stream::hex(file)?.series::<T>(samples, &self.series, false),
         };
         let bytes = samples.bytes().saturating_mul(self.series.count());
         let before_the_end = |left: u64| left.saturating_sub(bytes);
         stream.skip(self.byte_skip.unwrap_or_else(|| stream.exactly_left().map_or(0, before_the_end)))?;
         // Beyond the samples a compressed stream must end.
-        stream.series(samples, &self.series, self.window && self.encoding == Encoding::Raw)
+        stream.series::<T>(samples, &self.series, self.window && self.encoding == Encoding::Raw)
     }
 }
 

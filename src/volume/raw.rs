@@ -50,8 +50,9 @@ impl Volume {
         }
         let mut stream = Stream::raw(access.open(path)?)?;
         stream.skip(offset)?;
-        let values = stream.samples(&Samples { kind, dims, big_endian, rescale: None, z_fastest: false }, false)?;
-        let volume = Self::new(&path.display().to_string(), dims, DVec3::ONE, values)?;
+        let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
+        let values = stream.samples::<f32>(&samples, false)?;
+        let volume = Self::from_values(&path.display().to_string(), dims, DVec3::ONE, values)?;
         Ok(Self { encoding: Some(Encoding { format: FORMAT, sample_type: kind, channels: 1, times: 1 }), ..volume })
     }
 }

@@ -191,14 +191,14 @@ mod tests {
         // Values are world positions along x.
         let position = |grid: &Grid, index: u32| (grid.world_position(grid.voxel_at(index)) + grid.place()).x as f32;
         let of = |grid: Grid| {
-            let values = (0..grid.dims.element_product()).map(|index| position(&grid, index)).collect();
+            let values: Vec<f32> = (0..grid.dims.element_product()).map(|index| position(&grid, index)).collect();
             Volume::piece(grid, values)
         };
         let access = Access::new(&ReadOptions::default()).unwrap();
         let onto = of(coarser).onto(&of(finest), Resampling::Linear, ("channel", Path::new("file")), &access).unwrap();
         let mut inside = 0;
         for index in 0..finest.dims.element_product() {
-            let (found, expected) = (onto.values()[index as usize], position(&finest, index));
+            let (found, expected) = (onto.values().at(index as usize), position(&finest, index));
             assert_eq!(found.is_nan(), !(-2.5..=5.5).contains(&expected), "{index}");
             assert!(found.is_nan() || (found - expected).abs() < 1e-5, "{index}: {found} {expected}");
             inside += u32::from(!found.is_nan());

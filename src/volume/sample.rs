@@ -2,7 +2,7 @@
 
 use glam::{DVec3, UVec3};
 
-use super::{Grid, Store, StoreLevel, Volume, VolumeError, invalid, punch_holes};
+use super::{Grid, Store, StoreLevel, Values, Volume, VolumeError, invalid};
 use crate::parallel::prelude::*;
 use crate::stats::StoreCounts;
 
@@ -48,8 +48,10 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
             values[first..first + row.len()].copy_from_slice(row);
         }
     }
-    let holes = punch_holes(&mut values);
-    if holes == values.len() as u64 {
+    let count = values.len() as u64;
+    let mut values = Values::from(values);
+    let holes = values.punch_holes();
+    if holes == count {
         let found = "only NaN or infinite samples".to_owned();
         return Err(invalid(origin, "data", found, "at least one finite sample".to_owned()));
     }
@@ -59,7 +61,7 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
     let grid = Grid::new(dims, spacing);
     let place: DVec3 = level.grid.place() + center(&grid) - center(&level.grid);
     let grid = if number == 0 && step == 1 { level.grid } else { grid.coarser_than(&levels[0].grid, place) };
-    Volume { holes, reads: Some(reads), ..Volume::piece(grid, values) }.stating(origin, store.facts())
+    Volume { holes, reads: Some(reads), ..Volume::piece(grid, values.narrowed()) }.stating(origin, store.facts())
 }
 
 /// The voxels of a sample that lie in one chunk: the first one, how many there are along each axis, and their values.
@@ -260,7 +262,7 @@ mod tests {
             let sample = sample("function", &store, side.pow(3) * 4).unwrap();
             assert_eq!(sample.dims(), UVec3::splat(side as u32));
             let value = |index: u32| store.value(level, sample.grid().voxel_at(index));
-            assert!((0..).zip(sample.values()).all(|(index, &found)| found == value(index)), "{level}");
+            assert!((0..).zip(sample.values()).all(|(index, found)| found == value(index)), "{level}");
             assert_eq!((sample.grid().unit(), sample.spacing()), (1.0, DVec3::splat(64.0 / side as f64)));
             let reads = sample.reads().unwrap();
             let chunks = (side / 4).pow(3);
@@ -284,10 +286,8 @@ mod tests {
                 (sample.value(voxel) - store.value(0, voxel * 2)).abs()
             };
             let most = (0..dims.element_product() - 1).map(difference).fold(0.0, f32::max);
-            let extremes = sample
-                .values()
-                .iter()
-                .fold([f32::MAX, f32::MIN], |[min, max], &value| [min.min(value), max.max(value)]);
+            let extremes =
+                sample.values().iter().fold([f32::MAX, f32::MIN], |[min, max], value| [min.min(value), max.max(value)]);
             if is_indexed {
                 assert_eq!(extremes, [0.0, 1000.0]);
             } else {

@@ -19,60 +19,19 @@ use super::access::Access;
 use super::file::File;
 use super::numbers::{Numbers, TextEnd};
 use super::source::{CHUNK, Source, invalid, io_error};
+use super::voxel::{Many, Voxel};
 use super::{Grid, VolumeError};
 
 /// Deflate spends at least 2 bits on a match of at most 258 bytes, so a stream expands at most by this factor.
 pub(super) const MAX_EXPANSION: u64 = 1032;
 
+/// The voxels that are converted at a time.
+const BLOCK: usize = 1 << 14;
+
 /// A number as stored in a file.
 pub(crate) trait Sample: Copy {
     fn to_f32(self) -> f32;
     fn to_f64(self) -> f64;
-}
-
-/// What samples are converted to: values or labels.
-pub(crate) trait Voxel: Copy + Send + Sync {
-    const ALLOWED: &'static str;
-
-    /// A voxel without a sample in the file.
-    const HOLE: Self;
-
-    /// The voxel for a sample; `None` if the sample is not allowed.
-    fn of(sample: impl Sample) -> Option<Self>;
-
-    /// The voxel between this one and another, at the fraction `part` of the way.
-    fn between(self, other: Self, part: f64) -> Self;
-}
-
-/// A value; one that is not finite makes a hole in the volume.
-impl Voxel for f32 {
-    const ALLOWED: &'static str = "numbers";
-    const HOLE: Self = Self::NAN;
-
-    fn of(sample: impl Sample) -> Option<Self> {
-        Some(sample.to_f32())
-    }
-
-    fn between(self, other: Self, part: f64) -> Self {
-        (f64::from(self) * (1.0 - part) + f64::from(other) * part) as Self
-    }
-}
-
-/// A label.
-impl Voxel for u16 {
-    const ALLOWED: &'static str = "labels, whole numbers from 0 to 65535";
-    const HOLE: Self = 0;
-
-    fn of(sample: impl Sample) -> Option<Self> {
-        let sample = sample.to_f64();
-        let label = sample as Self;
-        (f64::from(label) == sample).then_some(label)
-    }
-
-    /// The nearer of the two labels.
-    fn between(self, other: Self, part: f64) -> Self {
-        if part < 0.5 { self } else { other }
-    }
 }
 
 macro_rules! sample_types {
@@ -198,25 +157,47 @@ impl Samples {
     }
 
     /// The file's samples reordered so that x is fastest.
-    fn in_order<T: Copy>(&self, samples: Vec<T>) -> Vec<T> {
+    fn in_order<T: Voxel>(&self, path: &Path, samples: T::Many) -> Result<T::Many, VolumeError> {
         if !self.z_fastest {
-            return samples;
+            return Ok(samples);
         }
         let [nx, ny, nz] = self.dims.to_array().map(|n| n as usize);
         let rows = (0..nz).flat_map(|z| (0..ny).map(move |y| z + nz * y));
-        rows.flat_map(|first| (0..nx).map(move |x| first + nz * ny * x)).map(|at| samples[at]).collect()
+        let indices = rows.flat_map(|first| (0..nx).map(move |x| first + nz * ny * x));
+        let mut sorted = T::Many::default();
+        sorted.try_reserve_exact(samples.count()).map_err(self.too_many(path))?;
+        sorted.append_from(&samples, indices).map_err(self.too_many(path))?;
+        Ok(sorted)
     }
 
     /// Converts all of `bytes` and appends the voxels to `into`, which holds those before.
-    pub(super) fn append<T: Voxel>(&self, path: &Path, bytes: &[u8], into: &mut Vec<T>) -> Result<(), VolumeError> {
+    pub(super) fn append<T: Voxel>(&self, path: &Path, bytes: &[u8], into: &mut T::Many) -> Result<(), VolumeError> {
+        let mut voxels = Vec::new();
+        for bytes in bytes.chunks(BLOCK * self.kind.bytes() as usize) {
+            voxels.clear();
+            self.convert::<T>(path, bytes, &mut voxels, into.count())?;
+            into.append(&voxels).map_err(self.too_many(path))?;
+        }
+        Ok(())
+    }
+
+    /// Converts all of `bytes` and appends the voxels to `into`, in front of which there are some others.
+    pub(super) fn convert<T: Voxel>(
+        &self,
+        path: &Path,
+        bytes: &[u8],
+        into: &mut Vec<T>,
+        before: usize,
+    ) -> Result<(), VolumeError> {
         into.try_reserve(bytes.len() / self.kind.bytes() as usize).map_err(self.too_many(path))?;
         self.kind.convert(self, bytes, into).map_err(|sample| {
-            invalid(path, "data", format!("{sample} at voxel {}", self.voxel_at(into.len())), T::ALLOWED)
+            let voxel = self.voxel_at(before + into.len());
+            invalid(path, "data", format!("{sample} at voxel {voxel}"), T::ALLOWED)
         })
     }
 
-    /// Reserves the memory for their values.
-    pub(super) fn reserve<T>(&self, path: &Path, access: &Access) -> Result<(), VolumeError> {
+    /// Reserves the memory that their voxels take at most.
+    pub(super) fn reserve<T: Voxel>(&self, path: &Path, access: &Access) -> Result<(), VolumeError> {
         let [x, y, z] = self.dims.to_array();
         // Reordering the axes needs a second copy.
         let copies = if self.z_fastest { 2 } else { 1 };
@@ -224,11 +205,11 @@ impl Samples {
             path,
             "data",
             format!("{x} × {y} × {z} voxels"),
-            copies * u64::from(self.count()) * size_of::<T>() as u64,
+            copies * u64::from(self.count()) * T::bytes(self.kind, self.rescale.is_some()),
         )
     }
 
-    fn too_many(&self, path: &Path) -> impl Fn(TryReserveError) -> VolumeError {
+    pub(super) fn too_many(&self, path: &Path) -> impl Fn(TryReserveError) -> VolumeError {
         move |error| invalid(path, "data", format!("{} samples: {error}", self.count()), "fewer")
     }
 
@@ -354,7 +335,7 @@ impl Stream {
     }
 
     /// The samples. The stream must end after them, unless it is a `window` into a file in which more may follow.
-    pub(super) fn samples<T: Voxel>(mut self, samples: &Samples, window: bool) -> Result<Vec<T>, VolumeError> {
+    pub(super) fn samples<T: Voxel>(mut self, samples: &Samples, window: bool) -> Result<T::Many, VolumeError> {
         let expected = samples.bytes();
         match self.exactly_left() {
             Some(left) if left < expected || left > expected && !window => {
@@ -366,7 +347,7 @@ impl Stream {
             _ => {}
         }
         samples.reserve::<T>(&self.path, &self.access)?;
-        let values = self.read_samples(samples)?;
+        let values = self.read_samples::<T>(samples)?;
         // Reading to the end also checks a compressed stream's last checksum.
         if let Reader::Decoder(reader, _) = &mut self.reader {
             let rest = if window { u64::MAX } else { 1 };
@@ -379,9 +360,9 @@ impl Stream {
         Ok(values)
     }
 
-    pub(super) fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<Vec<T>, VolumeError> {
+    pub(super) fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<T::Many, VolumeError> {
         let path = self.path.clone();
-        let (mut values, mut chunk) = (Vec::new(), Vec::with_capacity(CHUNK as usize));
+        let (mut values, mut chunk) = (T::Many::default(), Vec::with_capacity(CHUNK as usize));
         // An uncompressed file certainly holds all samples. What a compressed stream holds is unknown, so memory grows as it is decoded.
         let known = if self.exactly_left().is_some() { samples.count() as usize } else { 0 };
         values.try_reserve_exact(known).map_err(samples.too_many(&path))?;
@@ -393,11 +374,11 @@ impl Stream {
             if read < wanted {
                 return Err(samples.mismatch(&path, samples.bytes() - left + read));
             }
-            samples.append(&path, &chunk, &mut values)?;
+            samples.append::<T>(&path, &chunk, &mut values)?;
             left -= read;
         }
         values.shrink_to_fit();
-        Ok(samples.in_order(values))
+        samples.in_order::<T>(&path, values)
     }
 
     /// Appends up to `bytes` bytes, fewer only at the end, and returns their number.

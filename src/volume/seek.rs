@@ -157,7 +157,7 @@ impl Store for FileStore {
             }
             read += length;
             row_values.clear();
-            samples.append::<f32>(path, &code, &mut row_values)?;
+            samples.convert::<f32>(path, &code, &mut row_values, 0)?;
             for (value, &found) in row.iter_mut().zip(row_values.iter().step_by(self.step as usize)) {
                 *value = found;
             }

@@ -1,12 +1,15 @@
 //! Several volumes of one grid in a file: channels, times, or both (SPEC §10).
 
+#[cfg(any(feature = "dicom", feature = "tiff"))]
+use std::collections::TryReserveError;
 use std::ops::Range;
 use std::path::Path;
 
 use super::VolumeError;
-use super::samples::{Samples, Stream, Voxel, dims_of};
+use super::samples::{Samples, Stream, dims_of};
 use super::seek::Located;
 use super::source::invalid;
+use super::voxel::{Many, Voxel};
 
 /// The maximum number of channels in a file.
 pub(super) const MAX_CHANNELS: u32 = 64;
@@ -102,12 +105,18 @@ impl Series {
 }
 
 /// Numbers of which those of a voxel lie side by side, sorted by what they are of.
+///
+/// # Errors
+/// If there is no memory for a copy of them.
 #[cfg(any(feature = "dicom", feature = "tiff"))]
-pub(super) fn apart<T: Copy>(numbers: Vec<T>, count: usize) -> Vec<T> {
+pub(super) fn apart<T: Voxel>(numbers: T::Many, count: usize) -> Result<T::Many, TryReserveError> {
     if count == 1 {
-        return numbers;
+        return Ok(numbers);
     }
-    (0..count).flat_map(|first| numbers.iter().skip(first).step_by(count)).copied().collect()
+    let mut sorted = T::Many::default();
+    let indices = (0..count).flat_map(|first| (first..numbers.count()).step_by(count));
+    sorted.append_from(&numbers, indices)?;
+    Ok(sorted)
 }
 
 impl Stream {
@@ -118,17 +127,17 @@ impl Stream {
         samples: &Samples,
         series: &Series,
         window: bool,
-    ) -> Result<Vec<T>, VolumeError> {
+    ) -> Result<T::Many, VolumeError> {
         let selection = self.access.selection();
         series.check(&self.path, selection)?;
         if self.access.is_noting() {
             let located = self.locate(samples, series)?;
             self.access.note(located);
-            return Ok(Vec::new());
+            return Ok(T::Many::default());
         }
         let channels = series.channels(selection);
         if series.count() == 1 {
-            return self.samples(samples, window);
+            return self.samples::<T>(samples, window);
         }
         let total = samples.bytes().saturating_mul(series.count());
         let is_wrong = |left: u64| left < total || left > total && !window;
@@ -141,25 +150,26 @@ impl Stream {
             SeriesOrder::Interleaved => {
                 self.skip(u64::from(time) * u64::from(series.channels) * samples.bytes())?;
                 let numbers = channels.map(u64::from);
-                return self.interleaved(samples, (series.channels.into(), numbers), window || series.times > 1);
+                return self.interleaved::<T>(samples, (series.channels.into(), numbers), window || series.times > 1);
             }
             #[cfg(any(feature = "codecs", feature = "npy"))]
             SeriesOrder::TimesInChannels => {
                 let numbers = channels.map(|channel| u64::from(channel) * u64::from(series.times) + u64::from(time));
-                return self.interleaved(samples, (series.count(), numbers), window);
+                return self.interleaved::<T>(samples, (series.count(), numbers), window);
             }
             _ => {}
         }
-        let (mut values, mut at) = (Vec::new(), 0);
+        let (mut values, mut at) = (T::Many::default(), 0);
         for channel in channels {
             let block = series.block(channel, selection);
             self.skip((block - at) * samples.bytes())?;
             samples.reserve::<T>(&self.path, &self.access)?;
-            let of_channel = self.read_samples(samples)?;
-            if values.is_empty() {
+            let of_channel = self.read_samples::<T>(samples)?;
+            if values.count() == 0 {
                 values = of_channel;
             } else {
-                values.extend_from_slice(&of_channel);
+                let appended = values.append_from(&of_channel, 0..of_channel.count());
+                appended.map_err(samples.too_many(&self.path))?;
             }
             at = block + 1;
         }
@@ -186,7 +196,7 @@ impl Stream {
         samples: &Samples,
         (count, numbers): (u64, impl Iterator<Item = u64>),
         window: bool,
-    ) -> Result<Vec<T>, VolumeError> {
+    ) -> Result<T::Many, VolumeError> {
         let [x, y, z] = samples.dims.to_array().map(u64::from);
         // They count as voxels along the axis that changes first.
         let sides = if samples.z_fastest { [x, y, z.saturating_mul(count)] } else { [x.saturating_mul(count), y, z] };
@@ -195,13 +205,15 @@ impl Stream {
             return Err(invalid(&self.path, "sizes", found, "at most 4294967295 samples"));
         };
         let (path, access) = (self.path.clone(), self.access.clone());
-        let all: Vec<T> = self.samples(&Samples { dims, ..*samples }, window)?;
+        let all = self.samples::<T>(&Samples { dims, ..*samples }, window)?;
         // Those of a voxel lie together, or where z changes first, those of a slice.
         let together = if samples.z_fastest { (x * y) as usize } else { 1 };
-        let mut values = Vec::new();
+        let (count, mut values) = (count as usize, T::Many::default());
         for number in numbers {
             samples.reserve::<T>(&path, &access)?;
-            values.extend(all.chunks(together).skip(number as usize).step_by(count as usize).flatten().copied());
+            let runs = (number as usize * together..all.count()).step_by(count * together);
+            let appended = values.append_from(&all, runs.flat_map(|first| first..first + together));
+            appended.map_err(samples.too_many(&path))?;
         }
         Ok(values)
     }

@@ -13,8 +13,9 @@ use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::{MAX_COSINE, lengths_and_directions};
-use super::samples::{Voxel, dims_of};
+use super::samples::dims_of;
 use super::source::invalid;
+use super::voxel::{Many, Voxel};
 use crate::parallel::prelude::*;
 
 /// The maximum angle in degrees between an axis and its orthogonal direction. Flatter volumes have damaged headers.
@@ -134,6 +135,7 @@ impl Lattice {
             invalid(path, field, format!("axes sheared by {degrees:.2}°, {found}"), allowed)
         };
         let Some(dims) = dims else { return Err(too_many(format!("an orthogonal grid of {sizes:?} voxels"))) };
+        // Between samples values are no whole numbers.
         let bytes = u64::from(dims.element_product()) * size_of::<T>() as u64;
         access.reserve(path, field, format!("an orthogonal grid of {dims} voxels"), bytes)?;
         let mut values = Vec::new();
@@ -145,7 +147,7 @@ impl Lattice {
         );
         let first = DVec3::from_array(ranges.map(|[first, _]| first));
         values.resize(dims.element_product() as usize, T::HOLE);
-        let source = Samples { dims: loaded.dims, values: &loaded.values };
+        let source = Samples::<T> { dims: loaded.dims, values: &loaded.values };
         let rows = values.par_chunks_mut(dims.x as usize).enumerate();
         rows.for_each(|(row, values)| {
             let (y, z) = (row as u32 % dims.y, row as u32 / dims.y);
@@ -158,7 +160,7 @@ impl Lattice {
         if let Some(orientation) = &mut orientation {
             orientation.origin += orientation.axes * (first * self.spacing);
         }
-        Ok(Loaded { dims, orientation, values, ..loaded })
+        Ok(Loaded { dims, orientation, values: values.into(), ..loaded })
     }
 }
 
@@ -200,19 +202,19 @@ impl Shear {
 }
 
 /// Samples on their own lattice.
-struct Samples<'a, T> {
+struct Samples<'a, T: Voxel> {
     dims: UVec3,
-    values: &'a [T],
+    values: &'a T::Many,
 }
 
 impl<T: Voxel> Samples<'_, T> {
     /// The value at a position that is a whole number along the last of the given axes; `None` outside every sample's cell.
     fn at(&self, place: DVec3, [a, b, c]: [usize; 3]) -> Option<T> {
         let strides = [1, self.dims.x as usize, self.dims.x as usize * self.dims.y as usize];
-        let plane = &self.values[place[c] as usize * strides[c]..];
+        let plane = place[c] as usize * strides[c];
         let (i, i_part) = cell(place[a], self.dims[a])?;
         let (j, j_part) = cell(place[b], self.dims[b])?;
-        let sample = |i: usize, j: usize| plane[i * strides[a] + j * strides[b]];
+        let sample = |i: usize, j: usize| self.values.at(plane + i * strides[a] + j * strides[b]);
         let row = |j: usize| match i_part {
             0.0 => sample(i, j),
             part => sample(i, j).between(sample(i + 1, j), part),
@@ -244,9 +246,9 @@ mod tests {
     use super::super::samples::SampleType;
     use super::*;
 
-    fn loaded<T>(dims: UVec3, lattice: &Lattice, origin: DVec3, values: Vec<T>) -> Loaded<T> {
+    fn loaded<T: Voxel>(dims: UVec3, lattice: &Lattice, origin: DVec3, values: Vec<T>) -> Loaded<T> {
         let orientation = Some(Orientation { axes: lattice.axes, origin });
-        Loaded { spacing: Some(lattice.spacing), orientation, ..Loaded::new(dims, SampleType::F32, values) }
+        Loaded { spacing: Some(lattice.spacing), orientation, ..Loaded::new(dims, SampleType::F32, values.into()) }
     }
 
     fn straighten<T: Voxel>(dims: UVec3, steps: [DVec3; 3], values: Vec<T>) -> Loaded<T> {
@@ -265,7 +267,8 @@ mod tests {
     fn right_angles_stay_as_they_are() {
         let steps = [DVec3::new(0.0, 2.0, 0.0), DVec3::new(3.0, 0.0, 0.0002), DVec3::new(0.0, 0.0, 4.0)];
         let result = straighten(UVec3::new(2, 1, 1), steps, vec![1.0_f32, 2.0]);
-        assert_eq!((result.dims, result.values), (UVec3::new(2, 1, 1), vec![1.0, 2.0]));
+        assert_eq!(result.dims, UVec3::new(2, 1, 1));
+        assert_eq!(result.values.as_slice(), [1.0, 2.0]);
     }
 
     /// Slices that a tilted gantry moves by one row each, and by half a row.
@@ -278,17 +281,29 @@ mod tests {
         let whole = straighten(dims, tilted(1.0), values());
         assert_eq!((whole.dims, whole.spacing), (UVec3::new(1, 4, 3), Some(DVec3::new(1.0, 2.0, 4.0))));
         let expected = [0.0, 1.0, hole, hole, hole, 10.0, 11.0, hole, hole, hole, 20.0, 21.0];
-        assert!(whole.values.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?}", whole.values);
+        assert!(
+            whole.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            "{:?}",
+            whole.values
+        );
         // Tilted the other way, the first voxel is no longer sample 0.
         let back = straighten(dims, tilted(-1.0), values());
         assert_eq!(back.orientation.unwrap().origin, DVec3::new(0.0, -4.0, 0.0));
         let expected = [hole, hole, 0.0, 1.0, hole, 10.0, 11.0, hole, 20.0, 21.0, hole, hole];
-        assert!(back.values.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?}", back.values);
+        assert!(
+            back.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            "{:?}",
+            back.values
+        );
         let half = straighten(dims, tilted(0.5), values());
         assert_eq!(half.dims, UVec3::new(1, 3, 3));
         // Half a row off, the outer halves of the outermost cells have their samples' values.
         let expected = [0.0, 1.0, hole, 10.0, 10.5, 11.0, hole, 20.0, 21.0];
-        assert!(half.values.iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()), "{:?}", half.values);
+        assert!(
+            half.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            "{:?}",
+            half.values
+        );
     }
 
     /// A field that is linear in the patient stays the same field, whichever axes are sheared.
@@ -313,7 +328,7 @@ mod tests {
             assert!((axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, 1e-12), "{mask}");
             let inverse = DMat3::from_cols(steps[0], steps[1], steps[2]).inverse();
             let (mut compared, mut held) = (0, 0);
-            for (place, &value) in places(result.dims).zip(&result.values) {
+            for (place, value) in places(result.dims).zip(result.values.as_slice()) {
                 let at = origin + axes * (spacing * place);
                 let source = inverse * at;
                 let distance = (source - source.clamp(DVec3::ZERO, dims.as_dvec3() - 1.0)).abs().max_element();
@@ -353,7 +368,7 @@ mod tests {
         let labels = straighten(UVec3::new(3, 1, 3), steps, vec![1_u16, 2, 3, 4, 5, 6, 7, 8, 9]);
         assert_eq!((labels.dims.x, labels.values), (4, vec![1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 9]));
         let values = straighten(UVec3::new(3, 1, 2), steps, vec![1.0, 2.0, 3.0, 4.0, 5.0, f32::NAN]);
-        let found: Vec<bool> = values.values.iter().map(|value| value.is_nan()).collect();
+        let found: Vec<bool> = values.values.as_slice().iter().map(|value| value.is_nan()).collect();
         assert_eq!(found, [false, false, false, false, false, true]);
     }
 

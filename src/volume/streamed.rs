@@ -278,7 +278,7 @@ pub(crate) fn sample_of_channels(
             origin: labels.origin.clone(),
             dims: own.dims(),
             spacing: None,
-            values: labels_of(&labels.origin, (UVec3::ZERO, own.dims(), step), own.values())?,
+            values: labels_of(&labels.origin, (UVec3::ZERO, own.dims(), step), own.values().iter())?,
             names: labels.store.facts().label_names,
         })
     };

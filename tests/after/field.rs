@@ -103,7 +103,7 @@ fn exact_fields_interpolate() {
         scene.splatting.interpolation = Interpolation::Exact;
         scene.splatting.check().unwrap();
         let field = Field::new(&volume, &scene).unwrap();
-        let values = volume.values().iter().map(|&value| f64::from(value));
+        let values = volume.values().iter().map(f64::from);
         let (min, max) = values.clone().fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
         let worst = |field: &Field| {
             let error = |(value, index): (f64, u32)| {
@@ -169,7 +169,7 @@ fn as_specified(volume: &Volume, scene: &Scene, geometry: &Geometry, pixel: DVec
         stretched.y_axis / stretched.y_axis.length().max(1.0),
     ) * right.transpose();
     let (mut sum, mut weights) = (0.0, 0.0);
-    for (index, &value) in (0..).zip(volume.values()) {
+    for (index, value) in (0..).zip(volume.values()) {
         let voxel = grid.voxel_at(index);
         let p = grid.world_position(voxel) / grid.unit();
         let (offset, e) = match &geometry.eye {

@@ -54,7 +54,7 @@ fn assert_shows(image: &Image, scene: &Scene) {
 
 /// The volume with a texture: in homogeneous matter rounding would decide about the direction of the kernel's gradient.
 fn textured(volume: &Volume) -> Volume {
-    let values = (0_u32..).zip(volume.values()).map(|(at, &v)| v + (at.wrapping_mul(2_654_435_761) >> 28) as f32);
+    let values = (0_u32..).zip(volume.values()).map(|(at, v)| v + (at.wrapping_mul(2_654_435_761) >> 28) as f32);
     Volume::new("textured", volume.dims(), volume.grid().spacing, values.collect()).unwrap()
 }
 
@@ -212,7 +212,7 @@ fn holes_and_labels_are_the_twins() {
 fn holes_and_labels(gpu: &GpuHeadless, mut scene: Scene) {
     let compositing = scene.splatting.compositing;
     let (volume, _) = head([1.0, 1.0, 1.5]);
-    let hollow = (0..).zip(volume.values()).map(|(at, &v)| if at % 97 < 3 { f32::NAN } else { v }).collect();
+    let hollow = (0..).zip(volume.values()).map(|(at, v)| if at % 97 < 3 { f32::NAN } else { v }).collect();
     let hollow = Volume::new("hollow", volume.dims(), volume.grid().spacing, hollow).unwrap();
     assert_twins(gpu, (&hollow, &scene), 60.0, &format!("holes, {compositing:?}"));
     let values = (0..).zip(volume.values()).map(|(at, _)| (at / 9 % 4) as u16).collect();

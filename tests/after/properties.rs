@@ -235,7 +235,7 @@ fn the_cube_does_not_pop() {
 fn matter_at_the_end_of_the_range_is_matter() {
     for inverted in [false, true] {
         let cube = builtin::volume("cube").unwrap();
-        let values = cube.values().iter().map(|&value| if inverted { 255.0 - value } else { value }).collect();
+        let values = cube.values().iter().map(|value| if inverted { 255.0 - value } else { value }).collect();
         let volume = Volume::new("cube", cube.grid().dims, cube.spacing(), values).unwrap();
         let mut scene = scene(96, 96);
         scene.camera = camera([0.70463, 0.70957, 0.2], 40.0);

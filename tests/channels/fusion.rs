@@ -59,7 +59,7 @@ fn another_grid_is_resampled_in_the_files_space() {
     let mut inside = 0;
     for index in 0..pet.values().len() as u32 {
         let place = volume.grid().voxel_at(index).as_dvec3();
-        let value = f64::from(pet.values()[index as usize]);
+        let value = f64::from(pet.values().at(index as usize));
         if (5.0..=19.0).contains(&place.x) && place.y <= 23.5 {
             assert_at_most((value - linear(place)).abs(), 1e-4, format!("{place}"));
             inside += 1;
@@ -106,7 +106,11 @@ fn without_a_space_centres_coincide() {
                 weight * f64::from(first.value(low + step))
             })
             .sum();
-        assert_at_most((f64::from(second.values()[index as usize]) - expected).abs(), 1e-4, format!("{from_center}"));
+        assert_at_most(
+            (f64::from(second.values().at(index as usize)) - expected).abs(),
+            1e-4,
+            format!("{from_center}"),
+        );
     }
 }
 

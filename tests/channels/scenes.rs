@@ -253,7 +253,7 @@ fn channels_have_windows_and_colours_of_their_own() {
         let [start, top] = *transfer.opacity.points() else { panic!("{transfer:?}") };
         assert_eq!((start, top.0), ((20.0, 0.0), 70.0));
         // The mean ray through the volume meets an optical depth of 0.4, unless that takes more than half.
-        let shares = volume.values().iter().map(|&value| ((f64::from(value) - 20.0) / 50.0).clamp(0.0, 1.0));
+        let shares = volume.values().iter().map(|value| ((f64::from(value) - 20.0) / 50.0).clamp(0.0, 1.0));
         let mean = shares.sum::<f64>() / volume.values().len() as f64;
         let extent = (volume.dims().as_dvec3() * volume.grid().aspect()).element_sum() / 3.0;
         assert!((top.1 - (0.4 / (mean * extent)).min(0.5)).abs() < 1e-3, "{top:?}");

@@ -51,7 +51,7 @@ fn scene(folder: &Path, keys: &str, of: impl Fn(DVec3) -> f64) -> Scene {
 /// The places of the first channel's voxels, with the second one's values there.
 fn samples(volume: &Volume) -> impl Iterator<Item = (DVec3, f32)> {
     let place = |index: usize| volume.grid().voxel_at(index as u32).as_dvec3();
-    volume.channel(1).unwrap().values().iter().enumerate().map(move |(index, &value)| (place(index), value))
+    volume.channel(1).unwrap().values().iter().enumerate().map(move |(index, value)| (place(index), value))
 }
 
 #[test]

@@ -92,7 +92,7 @@ pub(super) fn split(random: &mut Random, round: usize, compositing: Compositing)
         .map(|index| (volume.grid().voxel_at(index).element_sum() / 2).is_multiple_of(2))
         .collect();
     let half = |of: bool| {
-        let values = volume.values().iter().zip(&side).map(|(&value, &side)| if side == of { value } else { 0.0 });
+        let values = volume.values().iter().zip(&side).map(|(value, &side)| if side == of { value } else { 0.0 });
         Volume::new("half", volume.dims(), volume.spacing(), values.collect()).unwrap()
     };
     let halves = joined(&[&half(true), &half(false)]);

@@ -123,7 +123,7 @@ fn one_channel_is_chosen() {
 #[test]
 fn one_time_fits_where_two_do_not() {
     let folder = Folder::new();
-    // Three times of two channels of 32³ bytes, which take 256 KiB of memory a time.
+    // Three times of two channels of 32³ bytes, which take 64 KiB of memory a time.
     let header = "{'descr': '|u1', 'fortran_order': False, 'shape': (3, 2, 32, 32, 32), }\n";
     let mut file = b"\x93NUMPY\x01\x00".to_vec();
     file.write_all(&(header.len() as u16).to_le_bytes()).unwrap();
@@ -139,11 +139,11 @@ fn one_time_fits_where_two_do_not() {
     }
     folder.write("times.npy", file);
     let small = "times.npy --backend cpu --set image={width=24,height=24} --turn 0 --count 3";
-    folder.run(&format!("orbit {small} --time 0..3 --memory 300000B -o f%d.png")).assert_success();
+    folder.run(&format!("orbit {small} --time 0..3 --memory 70000B -o f%d.png")).assert_success();
     let frames: BTreeSet<Vec<u8>> = (0..3).map(|frame| folder.read(&format!("f{frame}.png"))).collect();
     assert_eq!(frames.len(), 3, "all times differ");
     // Less than one time needs.
-    let run = folder.run(&format!("orbit {small} --time 0..3 --memory 200000B -o no%d.png"));
+    let run = folder.run(&format!("orbit {small} --time 0..3 --memory 60000B -o no%d.png"));
     run.assert_failure(2, &["times.npy", "memory"]);
 }
 

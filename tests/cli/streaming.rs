@@ -317,10 +317,10 @@ fn memory_stays_within_the_limit() {
     let side = 256_u32;
     let value = |index: u32| {
         let at = [index % side, index / side % side, index / side / side].map(|n| f64::from(n) / f64::from(side) - 0.5);
-        (400.0 * (0.5 - at.iter().map(|n| n * n).sum::<f64>().sqrt())).clamp(0.0, 250.0) as u8
+        (400.0 * (0.5 - at.iter().map(|n| n * n).sum::<f64>().sqrt())).clamp(0.0, 250.0) as f32
     };
-    folder.write("ball.raw", (0..side.pow(3)).map(value).collect::<Vec<u8>>());
-    let ball = "ball.raw --dims 256,256,256 --type uint8";
+    folder.write("ball.raw", (0..side.pow(3)).flat_map(|index| value(index).to_le_bytes()).collect::<Vec<u8>>());
+    let ball = "ball.raw --dims 256,256,256 --type float32 --endian little";
     let set = "--backend cpu --set image={width=96,height=96} --set camera.fit=volume --set transfer.opacity=[[60,0],[80,1]] \
                --set transfer.color=[[0,[1,1,1]]]";
     let two = [("RAYON_NUM_THREADS", "2"), ("MALLOC_TRIM_THRESHOLD_", "65536")];

@@ -74,7 +74,7 @@ impl Store for MemoryStore {
     }
 
     fn range(&self, _: usize) -> Option<[f32; 2]> {
-        let ends = |[least, greatest]: [f32; 2], value: &f32| [least.min(*value), greatest.max(*value)];
+        let ends = |[least, greatest]: [f32; 2], value: f32| [least.min(value), greatest.max(value)];
         self.is_range_known.then(|| self.volume.values().iter().fold([f32::INFINITY, f32::NEG_INFINITY], ends))
     }
 

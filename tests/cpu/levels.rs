@@ -53,7 +53,7 @@ fn coarse_and_plain() -> (Volume, Volume) {
     write("coarse/zarr.json", array(DIMS).to_string().as_bytes());
     write("coarse/c/0/0/0", &values.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>());
     let coarse = Volume::open_with(folder.path(), &ReadOptions::default().with_level(1)).unwrap();
-    assert_eq!((coarse.values(), coarse.grid().unit(), coarse.grid().place()), (values.as_slice(), 1.0, PLACE));
+    assert_eq!((coarse.values(), coarse.grid().unit(), coarse.grid().place()), ((&values).into(), 1.0, PLACE));
     (coarse, Volume::new("plain", DIMS, DVec3::splat(2.0), values).unwrap())
 }
 

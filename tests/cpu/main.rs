@@ -19,6 +19,7 @@ mod scenes;
 mod stores;
 mod streams;
 mod surfaces;
+mod values;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::cpu;

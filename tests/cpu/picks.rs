@@ -50,7 +50,7 @@ fn a_pick_is_the_front_of_the_ball() {
             assert!(pick.position.y > -20.5 && pick.position.y < -13.0, "{what}: {pick:?}");
             let from = if let Projection::Perspective { .. } = projection { 120.0 } else { 0.0 };
             assert!((pick.depth - from - pick.position.y).abs() < 1e-3, "{what}: {pick:?}");
-            let expected = volume.values()[volume.grid().index_of(pick.voxel) as usize];
+            let expected = volume.values().at(volume.grid().index_of(pick.voxel) as usize);
             assert_eq!((pick.value, pick.label), (expected, Some(expected as u16 * 10)), "{what}");
             assert_eq!(renderer.pick([1, 1]).unwrap(), None, "{what}: beside the ball");
             assert!(renderer.pick([97, 0]).unwrap_err().to_string().contains("97×97"), "{what}");

@@ -77,7 +77,7 @@ fn cases(random: &mut Random, count: usize) -> Vec<(String, CpuRenderer)> {
 
 /// A volume with a second channel, its mirror image, in another colour.
 fn two_channels(volume: &Volume, scene: &Scene) -> (Volume, Scene) {
-    let mirrored = volume.values().iter().rev().copied().collect();
+    let mirrored = volume.values().iter().rev().collect();
     let mirrored = Volume::new("mirrored", volume.dims(), volume.spacing(), mirrored).unwrap();
     let mut channel = Channel::new(VolumeSource::Memory);
     channel.transfer = transfer(&[(0.0, [0.1, 0.9, 0.2])], &[(20.0, 0.0), (220.0, 0.8)]);
@@ -88,7 +88,7 @@ fn two_channels(volume: &Volume, scene: &Scene) -> (Volume, Scene) {
 
 /// A volume of colours whose luminance is about that of the values.
 fn colored(volume: &Volume) -> Volume {
-    let of_value = |(index, &value): (usize, &f32)| {
+    let of_value = |(index, value): (usize, f32)| {
         let [value, other] = [value.clamp(0.0, 255.0), ((index * 37) % 256) as f32];
         [value.round(), (0.9 * value).round(), (0.5 * value).round(), 128.0 + (other / 2.0).floor()]
     };

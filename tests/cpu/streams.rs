@@ -10,8 +10,8 @@ use sheetsplat::scene::VolumeSource;
 use sheetsplat::settings::{Classification, Region, Window};
 use sheetsplat::stats::StoreCounts;
 use sheetsplat::volume::{
-    Grid, IndexedStore, Store, StoreIndex, StoreLevel, StreamedChannel, StreamedLevel, StreamedVolume, Volume,
-    VolumeError,
+    Grid, IndexedStore, Store, StoreIndex, StoreLevel, StreamedChannel, StreamedLevel, StreamedVolume, ValueSlice,
+    Volume, VolumeError,
 };
 use sheetsplat::{Image, RenderError, Scene};
 
@@ -198,8 +198,8 @@ fn an_index_spares_chunks_and_tells_the_range() {
 }
 
 /// Values ten voxels nearer along x, so that slabs drawn together with the last that shows the wall are within its chunks.
-fn nearer(values: &[f32]) -> Vec<f32> {
-    values.iter().skip(10).chain(&[0.0; 10]).copied().collect()
+fn nearer(values: ValueSlice<'_>) -> Vec<f32> {
+    values.iter().skip(10).chain([0.0; 10]).collect()
 }
 
 #[test]

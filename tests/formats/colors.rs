@@ -59,7 +59,7 @@ fn colours_and_luminance() {
             "rgba.nrrd" | "rgba.tif" => 65535.0,
             _ => 255.0,
         };
-        for (index, &value) in (0..).zip(volume.values()) {
+        for (index, value) in (0..).zip(volume.values()) {
             let color = bytes_at(volume.grid().voxel_at(index), true).truncate() / 255.0;
             let luminance = color.dot(DVec3::new(0.2126, 0.7152, 0.0722)) * full;
             assert!((f64::from(value) - luminance).abs() < 1e-6 * full, "{name}: {value}, not {luminance}");

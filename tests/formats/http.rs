@@ -35,7 +35,7 @@ fn stores_have_the_values_of_those_on_disk() {
         let query = if prefix == "query" { "/?key=1" } else { "" };
         let found = open(&format!("{}/{prefix}/{store}{query}", server.address)).unwrap();
         let expected = open(fixture(&format!("zarr/{store}")).to_str().unwrap()).unwrap();
-        assert_eq!((found.dims(), found.values()), (DIMS, values().as_slice()), "{prefix}/{store}");
+        assert_eq!((found.dims(), found.values()), (DIMS, (&values()).into()), "{prefix}/{store}");
         assert_eq!(found, expected, "{prefix}/{store}");
         assert_eq!(found.reads().map(|reads| reads.chunks_read), expected.reads().map(|reads| reads.chunks_read));
     }
@@ -115,7 +115,7 @@ fn addresses_are_no_paths() {
     let scene = Scene::parse(&text, "a", folder.path(), &[]).unwrap();
     assert_eq!(scene.volume, VolumeSource::File(PathBuf::from(&address)));
     let volume = scene.load_volume().unwrap();
-    assert_eq!((volume.values(), volume.labels().is_some()), (values().as_slice(), true));
+    assert_eq!((volume.values(), volume.labels().is_some()), ((&values()).into(), true));
     let written = scene.to_toml(folder.path()).unwrap();
     assert_eq!(Scene::parse(&written, "a", folder.path(), &[]).unwrap(), scene);
 

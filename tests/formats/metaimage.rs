@@ -30,7 +30,7 @@ fn of_itk() {
 fn flipped_by_itk() {
     let volume = Volume::open(&fixture("flipped.mhd")).unwrap();
     let rows: Vec<f32> = values().chunks(5).flat_map(|row| row.iter().rev().copied()).collect();
-    assert_eq!((volume.dims(), volume.values()), (DIMS, rows.as_slice()));
+    assert_eq!((volume.dims(), volume.values()), (DIMS, (&rows).into()));
     let axes = DMat3::from_diagonal(RAS_FROM_LPS) * rotation();
     let flipped = axes * DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
     assert_lies(&volume, flipped, RAS_FROM_LPS * ORIGIN + axes.x_axis * 4.0 * SPACING.x);
@@ -40,7 +40,7 @@ fn flipped_by_itk() {
 #[test]
 fn big_endian_and_single_bytes() {
     let volume = local(PLAIN, &data()).unwrap();
-    assert_eq!((volume.values(), volume.dims()), (values().as_slice(), DIMS));
+    assert_eq!((volume.values(), volume.dims()), ((&values()).into(), DIMS));
     assert_eq!((volume.spacing(), volume.orientation()), (DVec3::ONE, None));
     let bytes: Vec<u8> = values().iter().map(|&value| value as u8).collect();
     let header = PLAIN.replace("BinaryDataByteOrderMSB = True\n", "").replace("MET_SHORT", "MET_UCHAR");
@@ -54,7 +54,7 @@ fn spellings_slope_and_size() {
         .replace("DimSize", "ElementToIntensityFunctionSlope = 2\nElementToIntensityFunctionOffset=-1\nDimSize")
         .replace("DimSize", "ElementSize = 1 2 4\nRotation = 0 1 0 -1 0 0 0 0 1\nPosition = 1 2 3\nDimSize");
     let volume = local(&header, &data()).unwrap();
-    assert!(volume.values().iter().zip(values()).all(|(&found, value)| found == 2.0 * value - 1.0));
+    assert!(volume.values().iter().zip(values()).all(|(found, value)| found == 2.0 * value - 1.0));
     assert_eq!(volume.unit(), None);
     let micrometers = header.replace("DimSize", "DistanceUnits = um\nDimSize");
     assert_eq!(local(&micrometers, &data()).unwrap().unit(), Some("µm"));

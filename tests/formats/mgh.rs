@@ -55,7 +55,7 @@ fn data_after_the_samples_is_ignored() {
 #[test]
 fn without_ras_flag_slices_are_coronal() {
     let volume = Folder::new().open("a.mgh", &patched("plain.mgh", 28, &[0, 0])).unwrap();
-    assert_eq!((volume.values(), volume.spacing()), (values().as_slice(), DVec3::ONE));
+    assert_eq!((volume.values(), volume.spacing()), ((&values()).into(), DVec3::ONE));
     let orientation = volume.orientation().unwrap();
     assert_eq!(orientation.axes, DMat3::from_cols(DVec3::NEG_X, DVec3::NEG_Z, DVec3::Y));
     // The centre, 0 in right-anterior-superior, is at voxel (2.5, 2, 1.5).

@@ -20,7 +20,7 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 fn sform_slope_and_intercept() {
     let volume = Volume::open(&fixture("sform.nii")).unwrap();
     let expected: Vec<f32> = values().iter().map(|value| 0.5 * value - 3.0).collect();
-    assert_eq!((volume.dims(), volume.values()), (DIMS, expected.as_slice()));
+    assert_eq!((volume.dims(), volume.values()), (DIMS, (&expected).into()));
     assert_lies(&volume, rotation(), ORIGIN);
     assert!(!volume.orientation().unwrap().is_mirrored());
 }
@@ -265,7 +265,7 @@ fn shared_scan() {
     assert_eq!(nifti.dims(), nrrd.dims());
     assert_near(nifti.spacing(), nrrd.spacing());
     let slope = f64::from(2.007_843_f32);
-    for (&a, &b) in nifti.values().iter().zip(nrrd.values()) {
+    for (a, b) in nifti.values().iter().zip(nrrd.values()) {
         assert!((f64::from(a) - slope * f64::from(b)).abs() < 1e-3, "{a}, not {slope} times {b}");
     }
 }

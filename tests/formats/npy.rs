@@ -56,7 +56,7 @@ fn channels_times_and_colours_in_fortran_order() {
     fs::write(&path, fortran(&[2, 3, 4, 5], |at| value(at[1], at[2], at[3]) + 1000 * at[0] as i16)).unwrap();
     let volume = Volume::open(&path).unwrap();
     let [first, second]: [Vec<f32>; 2] = [of(0.0, 0.0), of(1.0, 0.0)];
-    assert_eq!((volume.values(), volume.channel(1).unwrap().values()), (first.as_slice(), second.as_slice()));
+    assert_eq!((volume.values(), volume.channel(1).unwrap().values()), ((&first).into(), (&second).into()));
     let times = fortran(&[3, 2, 3, 4, 5], |at| value(at[2], at[3], at[4]) + 1000 * at[1] as i16 + 10000 * at[0] as i16);
     fs::write(&path, times).unwrap();
     for (channel, time) in (0..2).flat_map(|channel| (0..3).map(move |time| (channel, time))) {

@@ -15,7 +15,7 @@ fn parse(keys: &str) -> Result<Scene, SceneError> {
 #[test]
 fn of_numpy() {
     let volume = parse(&format!("{KEYS}spacing = [0.5, 2, 3]")).unwrap().load_volume().unwrap();
-    assert_eq!((volume.dims(), volume.values(), volume.spacing()), (DIMS, values().as_slice(), SPACING));
+    assert_eq!((volume.dims(), volume.values(), volume.spacing()), (DIMS, (&values()).into(), SPACING));
     assert_eq!(volume.orientation(), None);
 }
 

@@ -124,49 +124,49 @@ fn files_named_by_scenes_are_confined() {
     assert!(Scene::open_with(&inside.join("scene.toml"), &[], &options).is_ok());
 }
 
-/// The limit is 60 values of 4 bytes.
+/// The limit is what 60 values take: as many bytes as the samples have if these are 1 or 2 and not rescaled, else 4.
 #[test]
 fn memory_is_limited_in_every_format() {
     let read = |name: &str, bytes: u64| Volume::open_with(&fixture(name), &ReadOptions::default().with_memory(bytes));
-    // Each format's file, and the memory that it needs besides the values.
-    for (name, besides) in [
-        ("itk.nrrd", 0),
-        ("bzip2.nrrd", 0),
-        ("text.nrrd", 0),
-        ("hex.nrrd", 0),
-        ("list.nhdr", 0),
-        ("local.mha", 0),
-        ("zlib.mha", 0),
-        ("sform.nii", 0),
-        ("itk.nii.gz", 0),
-        ("pair.hdr", 0),
-        ("c.npy", 0),
-        ("one.npz", 0),
+    // Each format's file, the bytes of a value, and the memory that it needs besides the values.
+    for (name, bytes, besides) in [
+        ("itk.nrrd", 4, 0),
+        ("bzip2.nrrd", 2, 0),
+        ("text.nrrd", 4, 0),
+        ("hex.nrrd", 2, 0),
+        ("list.nhdr", 2, 0),
+        ("local.mha", 4, 0),
+        ("zlib.mha", 4, 0),
+        ("sform.nii", 4, 0),
+        ("itk.nii.gz", 4, 0),
+        ("pair.hdr", 2, 0),
+        ("c.npy", 1, 0),
+        ("one.npz", 4, 0),
         // For reordering its axes.
-        ("fortran-big.npy", 240),
+        ("fortran-big.npy", 2, 120),
         // For a page.
-        ("plain.tif", 80),
-        ("tiled.tif", 80),
-        ("slices", 40),
-        ("imagej-large.tif", 0),
-        ("series", 0),
-        ("frames.dcm", 0),
-        ("rle.dcm", 0),
-        ("text.vti", 0),
-        ("appended.vti", 0),
+        ("plain.tif", 4, 80),
+        ("tiled.tif", 4, 80),
+        ("slices", 2, 40),
+        ("imagej-large.tif", 4, 0),
+        ("series", 4, 0),
+        ("frames.dcm", 4, 0),
+        ("rle.dcm", 2, 0),
+        ("text.vti", 2, 0),
+        ("appended.vti", 1, 0),
         // For a block.
-        ("appended-lz4.vti", 64),
-        ("text.vtk", 0),
-        ("binary.vtk", 0),
+        ("appended-lz4.vti", 4, 64),
+        ("text.vtk", 4, 0),
+        ("binary.vtk", 2, 0),
     ] {
-        let needed = 240 + besides;
+        let needed = 60 * bytes + besides;
         assert!(read(name, needed).is_ok(), "{name}: {:?}", read(name, needed).err());
         let message = read(name, needed - 1).expect_err(name).to_string();
         assert!(message.contains(": found ") && message.contains("bytes of memory, allowed: "), "{message}");
         assert!(message.contains(&format!("the memory limit of {} bytes", needed - 1)), "{message}");
     }
-    let exact = read("c.npy", 239).unwrap_err().to_string();
-    let expected = "c.npy: data: found 5 × 4 × 3 voxels, which take 240 bytes of memory, allowed: at most the memory limit of 239 bytes";
+    let exact = read("c.npy", 59).unwrap_err().to_string();
+    let expected = "c.npy: data: found 5 × 4 × 3 voxels, which take 60 bytes of memory, allowed: at most the memory limit of 59 bytes";
     assert!(exact.ends_with(expected), "{exact}");
 }
 
@@ -179,17 +179,17 @@ fn memory_is_limited_for_all_of_a_scene() {
             .load_volume_with(&ReadOptions::default().with_memory(bytes))
     };
     let labelled = "volume.path = 'c.npy'\nvolume.labels = 'c.npy'";
-    assert!(load(labelled, 240 + 120).is_ok());
-    let message = load(labelled, 240 + 119).unwrap_err().to_string();
+    assert!(load(labelled, 60 + 120).is_ok());
+    let message = load(labelled, 60 + 119).unwrap_err().to_string();
     assert!(
         message.ends_with(
-            "take 120 bytes of memory, allowed: at most the memory limit of 359 bytes, of which 240 are taken"
+            "take 120 bytes of memory, allowed: at most the memory limit of 179 bytes, of which 60 are taken"
         ),
         "{message}"
     );
     let raw = "volume = { path = 'part0.bin', dims = [5, 4, 1], type = 'uint16', endian = 'little' }";
-    assert!(load(raw, 80).is_ok());
-    assert!(load(raw, 79).unwrap_err().to_string().contains("part0.bin: data: found 5 × 4 × 1 voxels"));
+    assert!(load(raw, 40).is_ok());
+    assert!(load(raw, 39).unwrap_err().to_string().contains("part0.bin: data: found 5 × 4 × 1 voxels"));
     // Values and labels together.
     assert!(load("volume.builtin = 'head:8'", 8 * 8 * 5 * 6).is_ok());
     let message = load("volume.builtin = 'head:8'", 8 * 8 * 5 * 6 - 1).unwrap_err().to_string();

@@ -30,7 +30,7 @@ fn nifti_and_nrrd_are_resampled() {
         let volume = volume.unwrap();
         assert_warned(&warnings, ANGLE);
         assert_eq!(volume.dims(), UVec3::new(6, 6, 3), "{name}");
-        for (at, (&found, expected)) in volume.values().iter().zip(expected()).enumerate() {
+        for (at, (found, expected)) in volume.values().iter().zip(expected()).enumerate() {
             let is_near = found.is_nan() && expected.is_nan() || (found - expected).abs() < 1e-4;
             assert!(is_near, "{name}: {found}, not {expected}, at {at}");
         }

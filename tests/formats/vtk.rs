@@ -48,7 +48,7 @@ fn defaults_of_missing_attributes() {
     assert_eq!(plain("text.vti", " byte_order=\"LittleEndian\"").values(), values());
     assert_eq!(plain("base64-zlib.vti", " header_type=\"UInt32\"").values(), values());
     // Without an active array, the first one with one component counts.
-    assert!(plain("text.vti", " Scalars=\"values\"").values().iter().all(|&value| value == 0.0));
+    assert!(plain("text.vti", " Scalars=\"values\"").values().iter().all(|value| value == 0.0));
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn without_an_array_of_numbers_the_first_one_is_read() {
     }
     let flow = vectors("65").replacen("NumberOfComponents=\"65\"", "NumberOfComponents=\"3\"", 1);
     let volume = Folder::new().open("a.vti", flow.as_bytes()).unwrap();
-    assert_eq!((volume.channels().count(), volume.values()), (3, &[1.0; 60][..]));
+    assert_eq!((volume.channels().count(), volume.values()), (3, [1.0; 60][..].into()));
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn legacy_headers_are_of_keywords() {
             folder.open(name, &replaced(name, text, instead)).unwrap_or_else(|error| panic!("{instead:?}: {error}"));
         assert_eq!(
             (volume.dims(), volume.spacing(), volume.values()),
-            (DIMS, SPACING, values().as_slice()),
+            (DIMS, SPACING, (&values()).into()),
             "{instead:?}"
         );
     }
@@ -223,7 +223,7 @@ fn damage() {
         for length in 0..whole.len() {
             // The missing end may be another array.
             if let Ok(volume) = folder.open(name, &whole[..length]) {
-                assert_eq!((volume.dims(), volume.values()), (DIMS, values().as_slice()), "{name}: {length} bytes");
+                assert_eq!((volume.dims(), volume.values()), (DIMS, (&values()).into()), "{name}: {length} bytes");
             }
         }
     }

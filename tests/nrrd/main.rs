@@ -143,7 +143,7 @@ fn more_samples_than_one_chunk() {
         let header =
             format!("NRRD0001\ntype: short\nendian: big\ndimension: 3\nsizes: 70 50 30\nencoding: {encoding}\n");
         let volume = folder.attached(&header, &data).unwrap();
-        assert!(volume.values().iter().zip(&values).all(|(&read, &wrote)| read == f32::from(wrote)));
+        assert!(volume.values().iter().zip(&values).all(|(read, &wrote)| read == f32::from(wrote)));
         assert_eq!(volume.values().len(), values.len());
         assert_eq!(volume.value(UVec3::new(3, 2, 1)), f32::from(values[3 + 70 * (2 + 50)]));
     }
@@ -321,8 +321,8 @@ fn shared_volumes() {
         let volume = Volume::open(&shared(&format!("data/{name}"))).unwrap();
         assert_eq!(volume.dims(), UVec3::from_array(dims), "{name}");
         assert!((volume.spacing() - spacing).abs().max_element() < 1e-8, "{name}: {}", volume.spacing());
-        let least = volume.values().iter().copied().fold(f32::INFINITY, f32::min);
-        let most = volume.values().iter().copied().fold(f32::NEG_INFINITY, f32::max);
+        let least = volume.values().iter().fold(f32::INFINITY, f32::min);
+        let most = volume.values().iter().fold(f32::NEG_INFINITY, f32::max);
         assert_eq!([least, most], range, "{name}");
     }
 }

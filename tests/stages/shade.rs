@@ -59,7 +59,7 @@ fn tolerance(
     ray_error: f64,
     amount: DVec4,
 ) -> DVec4 {
-    let value = f64::from(volume.values()[index as usize]);
+    let value = f64::from(volume.values().at(index as usize));
     let magnitude = volume.gradient(volume.grid().voxel_at(index)).length();
     let tables = transfer.tables(volume.label(index));
     let alpha = tables.alpha(value, magnitude);
@@ -390,7 +390,7 @@ fn gradients_beside_holes() {
         _ => at.element_sum().is_multiple_of(2),
     };
     for name in ["scattered", "a block", "alternating"] {
-        let sample = |(index, &value)| if is_hole(name, whole.grid().voxel_at(index)) { f32::NAN } else { value };
+        let sample = |(index, value)| if is_hole(name, whole.grid().voxel_at(index)) { f32::NAN } else { value };
         let values = (0..).zip(whole.values()).map(sample).collect();
         let volume = Volume::new(name, DIMS, whole.spacing(), values).unwrap();
         let mut scene = oblique();

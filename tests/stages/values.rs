@@ -8,7 +8,7 @@ use sheetsplat::internals::gpu::uniforms;
 use sheetsplat::internals::gpu::volume_texture::{SIDES, ValueFormat, VolumeTexture};
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::view_geometry::ViewGeometry;
-use sheetsplat::volume::Volume;
+use sheetsplat::volume::{ValueSlice, Volume};
 use sheetsplat::wgpu::{BindingResource, BufferUsages};
 
 use crate::common::{Random, gpu, scene, transfer};
@@ -42,12 +42,12 @@ fn frame(values: ValueFormat) -> Frame {
 }
 
 /// Uploads values in layers of this side and lets a shader read them.
-fn seen(gpu: &GpuHeadless, values: &[f32], side: u32) -> Vec<f32> {
+fn seen(gpu: &GpuHeadless, values: ValueSlice<'_>, side: u32) -> Vec<f32> {
     seen_by(gpu, READ, values, side)
 }
 
 /// The same with this shader source.
-fn seen_by(gpu: &GpuHeadless, source: &str, values: &[f32], side: u32) -> Vec<f32> {
+fn seen_by(gpu: &GpuHeadless, source: &str, values: ValueSlice<'_>, side: u32) -> Vec<f32> {
     let device = gpu.device();
     let uploaded = VolumeTexture::upload_folded(device, gpu.queue(), values, side);
     let frame = init(device, &[frame(uploaded.format)], BufferUsages::UNIFORM);
@@ -58,9 +58,9 @@ fn seen_by(gpu: &GpuHeadless, source: &str, values: &[f32], side: u32) -> Vec<f3
 /// Checks the format and the bits that are read back, for layers of every side.
 fn check(name: &str, values: &[f32], format: ValueFormat) {
     let gpu = gpu();
-    assert_eq!(ValueFormat::of(values), format, "{name}");
+    assert_eq!(ValueFormat::of(values.into()), format, "{name}");
     for side in SIDES {
-        let seen = seen(&gpu, values, side);
+        let seen = seen(&gpu, values.into(), side);
         let differs = (0..values.len()).find(|&at| seen[at].to_bits() != values[at].to_bits());
         assert_eq!(differs.map(|at| (at, values[at], seen[at])), None, "{name}, side {side}");
     }
@@ -116,7 +116,7 @@ fn holes_are_told_by_their_bits() {
     let values: Vec<f32> = anything.take(5000).chain([f32::MAX, f32::MIN, 0.0, -0.0, f32::NAN]).collect();
     let volume = Volume::new("holes", UVec3::new(values.len() as u32, 1, 1), DVec3::ONE, values.clone()).unwrap();
     assert!(volume.holes() > 20);
-    assert_eq!(ValueFormat::of(&[1.0, f32::NAN, 2.0]), ValueFormat::Bits);
+    assert_eq!(ValueFormat::of(ValueSlice::F32(&[1.0, f32::NAN, 2.0])), ValueFormat::Bits);
     let marked = READ.replace(
         "bitcast<u32>(value_at(at))",
         &format!("select(bitcast<u32>(value_at(at)), {MARK}u, is_hole(stored_at(at)))"),
@@ -140,5 +140,5 @@ fn layers_go_on_where_they_were_left() {
     check("four", &values, ValueFormat::Bits);
     values[3] = -0.0;
     *values.last_mut().unwrap() = 1.0;
-    assert_eq!(ValueFormat::of(&values), ValueFormat::Bits);
+    assert_eq!(ValueFormat::of((&values).into()), ValueFormat::Bits);
 }

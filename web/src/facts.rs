@@ -119,7 +119,7 @@ impl<'a> Channel<'a> {
 impl Histogram {
     pub(crate) fn new(channel: &Volume) -> Self {
         let values = channel.values();
-        let finite = || values.iter().copied().filter(|value| !value.is_nan());
+        let finite = || values.iter().filter(|value| !value.is_nan());
         let [low, high] =
             finite().fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], value| [low.min(value), high.max(value)]);
         let (first, width) = (f64::from(low), f64::from(high) - f64::from(low));

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use crate::after::normalization::Normalization;
 use crate::parallel::prelude::*;
-use crate::volume::Grid;
+use crate::volume::{Grid, Sample, ValueSlice, for_type};
 
 /// A voxel of a cell's box is at least the least number with an opacity.
 const REACHES: u8 = 1;
@@ -43,7 +43,7 @@ impl Cells {
     /// `half_box` is half the box of the widest kernel; `shown` the least and the greatest number with an opacity.
     pub(super) fn new(
         grid: &Grid,
-        coefficients: &[f32],
+        coefficients: ValueSlice<'_>,
         numbers: &Normalization,
         half_box: DVec3,
         shown: [f32; 2],
@@ -51,7 +51,9 @@ impl Cells {
     ) -> Self {
         let bits_of = bits_of(numbers, shown);
         let least = if work == Work::Alone { usize::MAX } else { 1 << 16 };
-        let mut bits: Vec<u8> = coefficients.par_iter().with_min_len(least).map(|&c| bits_of(c)).collect();
+        let mut bits: Vec<u8> = for_type!(ValueSlice, coefficients, all => {
+            all.par_iter().with_min_len(least).map(|c| bits_of(c.to_f32())).collect()
+        });
         // From -⌈h⌉ + 1 to ⌈h⌉ around a cell, where a kernel reaches less than h.
         let half = half_box.ceil().min(grid.dims.as_dvec3()).max(DVec3::ONE).as_uvec3();
         let [nx, ny, nz] = grid.dims.to_array().map(|n| n as usize);
@@ -85,9 +87,9 @@ fn bits_of(numbers: &Normalization, [low, high]: [f32; 2]) -> impl Fn(f32) -> u8
 }
 
 /// Whether means of some coefficients may have an opacity.
-pub(super) fn may_show(coefficients: &[f32], numbers: &Normalization, shown: [f32; 2]) -> bool {
+pub(super) fn may_show(coefficients: ValueSlice<'_>, numbers: &Normalization, shown: [f32; 2]) -> bool {
     let bits_of = bits_of(numbers, shown);
-    coefficients.iter().fold(0, |bits, &c| bits | bits_of(c)) == REACHES | STAYS
+    coefficients.iter().fold(0, |bits, c| bits | bits_of(c)) == REACHES | STAYS
 }
 
 /// Replaces each entry along an axis by the union of those from `half - 1` before it to `half` after it.
@@ -131,8 +133,8 @@ mod tests {
         let numbers = Normalization { base: 0.0, scale: 1.0, range: [-1.0, 1.0] };
         let half_box = DVec3::new(2.0, 1.4, 2.5);
         for [low, high] in [[0.5, f32::MAX], [f32::MIN, -0.5], [-0.1, 0.1]] {
-            let cells = Cells::new(&grid, &values, &numbers, half_box, [low, high], Work::Shared);
-            let alone = Cells::new(&grid, &values, &numbers, half_box, [low, high], Work::Alone);
+            let cells = Cells::new(&grid, (&values).into(), &numbers, half_box, [low, high], Work::Shared);
+            let alone = Cells::new(&grid, (&values).into(), &numbers, half_box, [low, high], Work::Alone);
             assert_eq!(cells.bits, alone.bits);
             for index in 0..grid.dims.element_product() {
                 let at = grid.voxel_at(index).as_dvec3();

@@ -23,7 +23,7 @@ use crate::scene::Scene;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Compositing, Interpolation};
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::Volume;
+use crate::volume::{ValueSlice, Volume};
 
 /// The coefficients of a volume, and the bricks that its last frame drew.
 #[derive(Clone, Debug)]
@@ -88,15 +88,15 @@ impl Coefficients {
             Interpolation::Smooth => None,
             Interpolation::Exact => Some(coefficients::of_volume(volume, kernel)?),
         };
-        let all = exact.as_deref().unwrap_or(volume.values());
-        let numbers = Normalization::of(all.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
+        let all = exact.as_deref().map_or(volume.values(), ValueSlice::from);
+        let numbers = Normalization::of(all.iter()).unwrap_or(Normalization::new([0.0; 2]));
         let colors = Colors::new(volume, splatting.interpolation, kernel)?;
         Ok(Self { numbers, exact, colors, differences: Kept::Unused, ranges: None, shown: None, is_stale: false })
     }
 
     /// All of them, in memory order; NaN at holes.
-    pub(in crate::cpu) fn all<'a>(&'a self, volume: &'a Volume) -> &'a [f32] {
-        self.exact.as_deref().unwrap_or(volume.values())
+    pub(in crate::cpu) fn all<'a>(&'a self, volume: &'a Volume) -> ValueSlice<'a> {
+        self.exact.as_deref().map_or(volume.values(), ValueSlice::from)
     }
 
     /// The coefficients of the voxels' own colours, if they have any.

@@ -3,7 +3,7 @@
 use glam::UVec3;
 
 use crate::parallel::prelude::*;
-use crate::volume::Volume;
+use crate::volume::{ValueSlice, Volume};
 
 /// The maximum number of voxels of a volume whose differences are kept, which then take 192 MiB.
 const MAX_VOXELS: u64 = 1 << 24;
@@ -47,13 +47,13 @@ impl Differences {
 /// A volume's values, its voxels along each axis, and the steps in memory along each.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Neighbours<'a> {
-    values: &'a [f32],
+    values: ValueSlice<'a>,
     dims: UVec3,
     steps: [usize; 3],
 }
 
 impl<'a> Neighbours<'a> {
-    pub(super) fn of(values: &'a [f32], dims: UVec3, steps: [usize; 3]) -> Self {
+    pub(super) fn of(values: ValueSlice<'a>, dims: UVec3, steps: [usize; 3]) -> Self {
         Self { values, dims, steps }
     }
 
@@ -63,8 +63,8 @@ impl<'a> Neighbours<'a> {
         let along = |axis: usize| {
             let (has_before, has_after) = (voxel[axis] > 0, voxel[axis] + 1 < self.dims[axis]);
             let step = self.steps[axis];
-            let low = self.values[index - if has_before { step } else { 0 }];
-            let high = self.values[index + if has_after { step } else { 0 }];
+            let low = self.values.at(index - if has_before { step } else { 0 });
+            let high = self.values.at(index + if has_after { step } else { 0 });
             (high - low) * if has_before && has_after { 1.0 } else { 2.0 }
         };
         [along(0), along(1), along(2)]

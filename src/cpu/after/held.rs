@@ -12,7 +12,7 @@ use super::needs::Needs;
 use super::place::Placement;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::sheets::{COLUMNS, ROWS};
-use crate::volume::{Grid, Volume};
+use crate::volume::{Grid, ValueSlice, Values, Volume};
 
 /// The depth of the slabs whose voxels are held together, in voxels: deeper ones copy less often what neighbouring slabs share.
 const DEPTH: f64 = 8.0;
@@ -92,7 +92,7 @@ impl Frame<'_> {
         let half_box = self.placement.geometry.widest_half_box(&self.placement.view);
         let extent = self.extent(&slabs, origin, open, half_box);
         let nothing = |missing| {
-            let volume = Volume::piece(Grid { dims: UVec3::ZERO, ..self.grid }, Vec::new());
+            let volume = Volume::piece(Grid { dims: UVec3::ZERO, ..self.grid }, Values::default());
             Some(Held { slabs: slabs.clone(), extent, volume, cells: None, is_blank: true, missing })
         };
         if stream.range((extent.low, extent.held)).is_some_and(|range| self.is_dark(range)) {
@@ -106,10 +106,10 @@ impl Frame<'_> {
             return nothing(missing);
         }
         let values = stream.values((extent.low, extent.held), &seen);
-        let is_blank = shown.is_some_and(|shown| !may_show(&values, &self.numbers, shown));
+        let is_blank = shown.is_some_and(|shown| !may_show((&values).into(), &self.numbers, shown));
         let grid = Grid { dims: extent.held, ..self.grid };
         let cells = shown.filter(|_| !is_blank);
-        let cells = cells.map(|shown| Cells::new(&grid, &values, &self.numbers, half_box, shown, Work::Alone));
+        let cells = cells.map(|shown| Cells::new(&grid, (&values).into(), &self.numbers, half_box, shown, Work::Alone));
         Some(Held { slabs, extent, volume: Volume::piece(grid, values), cells, is_blank, missing })
     }
 
@@ -120,7 +120,7 @@ impl Frame<'_> {
 
     /// Whether no value between two has an opacity. If there are only holes, of which the minimum is the larger one, there is no value.
     pub(super) fn is_dark(&self, [min, max]: [f32; 2]) -> bool {
-        self.shown().is_some_and(|shown| min > max || !may_show(&[min, max], &self.numbers, shown))
+        self.shown().is_some_and(|shown| min > max || !may_show(ValueSlice::F32(&[min, max]), &self.numbers, shown))
     }
 
     /// The number of slabs whose voxels are held together.

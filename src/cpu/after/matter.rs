@@ -12,7 +12,7 @@ use super::held::Extent;
 use crate::after::normalization::Normalization;
 use crate::cpu::stream::Stream;
 use crate::lists::brick::{self, Brick};
-use crate::volume::{Grid, Volume};
+use crate::volume::{Grid, ValueSlice, Volume};
 
 /// The range, in numbers, of a transfer function's table for values that are not known.
 const WIDE: f32 = 1e9;
@@ -60,7 +60,7 @@ impl<'a> Matter<'a> {
     }
 
     /// The voxels at hand for all tiles: some box of the volume, and their coefficients and colours.
-    pub(super) fn at_hand(&self) -> (&'a Volume, Extent, &'a [f32], Option<ColorsOf<'a>>) {
+    pub(super) fn at_hand(&self) -> (&'a Volume, Extent, ValueSlice<'a>, Option<ColorsOf<'a>>) {
         match *self {
             Self::Whole { volume, coefficients } => {
                 (volume, Extent::whole(volume.grid()), coefficients.all(volume), coefficients.colors(volume))

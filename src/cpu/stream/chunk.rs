@@ -68,7 +68,7 @@ impl Chunk {
             bricks.shrink_to_fit();
             placed.shrink_to_fit();
         }
-        let bytes = values.as_ref().map_or(0, |volume| size_of_val(volume.values()))
+        let bytes = values.as_ref().map_or(0, |volume| volume.values().bytes())
             + bricks.len() * (size_of::<Brick>() + 2 * size_of::<u64>())
             + placed.len() * size_of::<Placed>();
         let drawn = drawn.unwrap_or_else(|| Arc::new(new));

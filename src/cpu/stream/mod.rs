@@ -102,7 +102,9 @@ impl Stream {
                 match chunk.values() {
                     None => there.fill(store.fill()),
                     Some((low, read)) => {
-                        there.copy_from_slice(&read.values()[index(row, low, read.dims())..][..count]);
+                        let first = index(row, low, read.dims());
+                        let own = read.values().slice(first..first + count);
+                        there.iter_mut().zip(own).for_each(|(there, own)| *there = own);
                     }
                 }
             }

@@ -32,7 +32,7 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
 use crate::volume::range::range_of;
-use crate::volume::{Grid, StoreLevel, StreamedLevel, StreamedVolume, Volume};
+use crate::volume::{Grid, StoreLevel, StreamedLevel, StreamedVolume, Values, Volume};
 
 /// The minimum number of threads that read: a server, or a disk, answers several requests in the time of one.
 const LEAST_READERS: usize = 8;
@@ -77,7 +77,7 @@ impl StreamRenderer {
         Source::check(&levels[values.level])?;
         let (simd, level) = simd::chosen()?;
         let (scene, transfer) = settled(&volume, scene)?;
-        let sampled = range_of(volume.sample.values().iter().copied());
+        let sampled = range_of(volume.sample.values().iter());
         Ok(Self { volume, values, scene, transfer, sampled, simd, level })
     }
 
@@ -154,7 +154,7 @@ impl StreamRenderer {
         let host = Host { window, is_part, first_hit: None, surfaces: None };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
             Classification::After => {
-                let nothing = Volume::piece(Grid { dims: UVec3::ZERO, ..grid }, Vec::new());
+                let nothing = Volume::piece(Grid { dims: UVec3::ZERO, ..grid }, Values::default());
                 let (numbers, is_range_known) = self.numbers();
                 let matter = Matter::Streamed { stream: &stream, nothing: &nothing, numbers, is_range_known };
                 let frame = after::Frame::new(0, (matter, &self.transfer), scene, view, host);

@@ -93,7 +93,7 @@ impl<'a> ChannelChunks<'a> {
         let volume = Volume::piece(*grid, values);
         let Some(labels) = &mut self.labels else { return Ok(Some(volume)) };
         let origin = labels.of.origin.clone();
-        let values = labels_of(&origin, (within.low, grid.dims, 1), &labels.read(within)?)?;
+        let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read(within)?)?;
         let labels = Labels { origin, dims: grid.dims, spacing: None, values, names: BTreeMap::new() };
         Ok(Some(volume.with_labels(labels)?))
     }

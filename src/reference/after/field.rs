@@ -38,7 +38,7 @@ impl<'a> Field<'a> {
     /// If no coefficients interpolate the volume's values.
     pub fn new(volume: &'a Volume, scene: &Scene) -> Result<Self, RenderError> {
         let (radius, falloff) = (scene.splatting.radius, scene.splatting.falloff);
-        let values = volume.values().iter().map(|&value| f64::from(if value.is_finite() { value } else { f32::NAN }));
+        let values = volume.values().iter().map(|value| f64::from(if value.is_finite() { value } else { f32::NAN }));
         let values: Vec<f64> = values.collect();
         let coefficients = match scene.splatting.interpolation {
             Interpolation::Smooth => values,
@@ -141,7 +141,7 @@ impl<'a> Field<'a> {
 /// The coefficients of a volume's colours.
 fn colors(volume: &Volume, scene: &Scene) -> Result<Vec<DVec4>, RenderError> {
     let (radius, falloff) = (scene.splatting.radius, scene.splatting.falloff);
-    let is_hole = |index: u32| volume.values()[index as usize].is_nan();
+    let is_hole = |index: u32| volume.values().at(index as usize).is_nan();
     let indices = 0..volume.values().len() as u32;
     let mut colors: Vec<DVec4> = indices.clone().filter_map(|index| volume.color(index)).collect();
     if scene.splatting.interpolation == Interpolation::Exact {

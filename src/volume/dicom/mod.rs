@@ -24,9 +24,10 @@ use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS};
-use super::samples::{SIZES, Samples, Voxel, dims_of};
+use super::samples::{SIZES, Samples, dims_of};
 use super::series::apart;
 use super::source::invalid;
+use super::voxel::{Many, Voxel};
 use crate::parallel;
 use crate::parallel::prelude::*;
 
@@ -63,21 +64,26 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
     let sides = [columns * u64::from(components), rows, count];
     let dims = dims_of(sides).ok_or_else(|| invalid(path, "Rows, Columns, slices", format!("{sizes:?}"), SIZES))?;
     let kind = first.pixels.kind;
-    Samples { kind, dims, big_endian: false, rescale: None, z_fastest: false }.reserve::<T>(path, access)?;
-    let mut values = Vec::new();
+    let rescale_of =
+        |slice: &series::Slice| Some(slice.rescale).filter(|&rescale| rescale != [1.0, 0.0] && components == 1);
+    let rescale = slices.iter().find_map(rescale_of);
+    let all = Samples { kind, dims, big_endian: false, rescale, z_fastest: false };
+    all.reserve::<T>(path, access)?;
+    let mut values = T::Many::default();
     // One slice per thread at a time, because codecs are slow.
     for slices in slices.chunks(parallel::current_num_threads()) {
         let frames: Vec<_> = slices.par_iter().map(|slice| images[slice.image].frame(slice.frame, access)).collect();
         for (slice, frame) in slices.iter().zip(frames) {
             let image = &images[slice.image];
-            let rescale = Some(slice.rescale).filter(|&rescale| rescale != [1.0, 0.0] && components == 1);
             let big_endian = cfg!(target_endian = "big");
-            let samples = Samples { kind: image.pixels.kind, dims, big_endian, rescale, z_fastest: false };
-            samples.append(&image.path, &frame?, &mut values)?;
+            let samples =
+                Samples { kind: image.pixels.kind, dims, big_endian, rescale: rescale_of(slice), z_fastest: false };
+            samples.append::<T>(&image.path, &frame?, &mut values)?;
         }
     }
     values.shrink_to_fit();
-    let (values, dims) = (apart(values, components.into()), dims.with_x(dims.x / u32::from(components)));
+    let values = apart::<T>(values, components.into()).map_err(all.too_many(path))?;
+    let dims = dims.with_x(dims.x / u32::from(components));
     let series = match components {
         1 => super::series::Series::default(),
         _ => super::series::Series::of_colors(components.into(), 1),

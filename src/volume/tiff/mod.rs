@@ -22,15 +22,16 @@ use self::stack::{Place, Run, Stack};
 use super::VolumeError;
 use super::access::Access;
 use super::loaded::Loaded;
-use super::samples::{SIZES, Samples, Stream, Voxel, dims_of};
+use super::samples::{SIZES, Samples, Stream, dims_of};
 use super::series::{Series, apart};
 use super::source::invalid;
+use super::voxel::{Many, Voxel};
 
 /// Reads the pages of one file.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut pages = Pages::open(path, access)?;
     let calibration = Calibration::of(&mut pages)?;
-    let mut slices = Slices::new(path, &pages, &calibration)?;
+    let mut slices = Slices::<T>::new(path, &pages, &calibration)?;
     let stack = calibration.stack.map(|stack| stack.of_pixels(pages.page.samples));
     let stack = stack.as_ref();
     let (series, selection) = (stack.map(Stack::series).unwrap_or_default(), access.selection());
@@ -62,8 +63,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
             match wanted(count) {
                 Some((channel, slice)) => {
                     samples.reserve::<T>(path, access)?;
-                    let page = stream.read_samples(&samples)?;
-                    slices.channels[channel].values.extend_from_slice(&page);
+                    let page = stream.read_samples::<T>(&samples)?;
+                    let appended = slices.channels[channel].values.append_from(&page, 0..page.count());
+                    appended.map_err(samples.too_many(path))?;
                     slices.channels[channel].slices.push(slice);
                 }
                 None => stream.skip(samples.bytes())?,
@@ -112,7 +114,7 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Acc
     };
     let mut first = Pages::open(slices_of_one_kind[0], access)?;
     let calibration = Calibration::of(&mut first)?;
-    let mut slices = Slices::new(path, &first, &calibration)?;
+    let mut slices = Slices::<T>::new(path, &first, &calibration)?;
     run::check(path, files)?;
     slices.channels.push(OfChannel::default());
     for (slice, file) in (0..).zip(slices_of_one_kind) {
@@ -122,34 +124,33 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Acc
 }
 
 /// The slices of a channel in the order of the file.
-struct OfChannel<T> {
-    values: Vec<T>,
+struct OfChannel<T: Voxel> {
+    values: T::Many,
     /// The number of each slice.
     slices: Vec<u32>,
 }
 
-impl<T> Default for OfChannel<T> {
+impl<T: Voxel> Default for OfChannel<T> {
     fn default() -> Self {
-        Self { values: Vec::new(), slices: Vec::new() }
+        Self { values: T::Many::default(), slices: Vec::new() }
     }
 }
 
-impl<T: Copy> OfChannel<T> {
+impl<T: Voxel> OfChannel<T> {
     /// The values with the slices in order; `None` if a slice is missing or comes twice.
-    fn in_order(self) -> Option<Vec<T>> {
+    fn in_order(self) -> Option<T::Many> {
         let Self { mut values, mut slices } = self;
         let mut sorted = slices.clone();
         sorted.sort_unstable();
         if !sorted.into_iter().eq(0..slices.len() as u32) {
             return None;
         }
-        let size = values.len() / slices.len().max(1);
+        let size = values.count() / slices.len().max(1);
         for at in 0..slices.len() {
             // Each exchange brings one slice to its place, which lies behind this one.
             while slices[at] as usize != at {
                 let to = slices[at] as usize;
-                let (before, after) = values.split_at_mut(to * size);
-                before[at * size..][..size].swap_with_slice(&mut after[..size]);
+                values.swap(at * size, to * size, size);
                 slices.swap(at, to);
             }
         }
@@ -158,7 +159,7 @@ impl<T: Copy> OfChannel<T> {
 }
 
 /// Slices of one size and type, appended to the values of their channel.
-struct Slices<'a, T> {
+struct Slices<'a, T: Voxel> {
     path: &'a Path,
     page: Page,
     /// The first page's palette, unless another page has a different one.
@@ -185,7 +186,7 @@ impl<'a, T: Voxel> Slices<'a, T> {
     fn count(&self, channel: usize) -> u32 {
         let [width, height] = self.page.size.map(u64::from);
         let samples = width * height * u64::from(self.page.samples);
-        (self.channels[channel].values.len() as u64 / samples.max(1)) as u32
+        (self.channels[channel].values.count() as u64 / samples.max(1)) as u32
     }
 
     fn add(&mut self, pages: &mut Pages, (channel, slice): (usize, u32), access: &Access) -> Result<(), VolumeError> {
@@ -205,26 +206,28 @@ impl<'a, T: Voxel> Slices<'a, T> {
         self.samples(1)?.reserve::<T>(&pages.path, access)?;
         let bytes = pages.bytes()?;
         self.channels[channel].slices.push(slice);
-        samples.append(&pages.path, &bytes, &mut self.channels[channel].values)
+        samples.append::<T>(&pages.path, &bytes, &mut self.channels[channel].values)
     }
 
     fn finish(mut self, calibration: &Calibration) -> Result<Loaded<T>, VolumeError> {
-        let Samples { dims, kind, .. } = self.samples(self.count(0))?;
+        let samples = self.samples(self.count(0))?;
+        let Samples { dims, kind, .. } = samples;
         let components = self.page.samples;
         let dims = dims.with_x(dims.x / components);
-        let mut all = Vec::new();
+        let mut all = T::Many::default();
+        let too_many = samples.too_many(self.path);
         for channel in std::mem::take(&mut self.channels) {
             let allowed = "every slice of every channel and time once, as the description says";
             let refused = || invalid(self.path, "TiffData", "a slice that is missing or comes twice", allowed);
             let values = channel.in_order().ok_or_else(refused)?;
-            if all.is_empty() {
+            if all.count() == 0 {
                 all = values;
             } else {
-                all.extend_from_slice(&values);
+                all.append_from(&values, 0..values.count()).map_err(&too_many)?;
             }
         }
         all.shrink_to_fit();
-        let all = apart(all, components as usize);
+        let all = apart::<T>(all, components as usize).map_err(&too_many)?;
         let series = if components > 1 { Series::of_colors(components, 1) } else { Series::default() };
         let spacing = calibration.spacing.map(|[x, y]| {
             let z = calibration.between_slices.unwrap_or_else(|| {
@@ -261,8 +264,8 @@ mod tests {
     #[test]
     fn slices_come_into_their_order() {
         let of = |slices: &[u32]| {
-            let values = slices.iter().flat_map(|&slice| [10 * slice, 10 * slice + 1]).collect();
-            OfChannel { values, slices: slices.to_vec() }.in_order()
+            let values = slices.iter().flat_map(|&slice| [10 * slice as u16, 10 * slice as u16 + 1]).collect();
+            OfChannel::<u16> { values, slices: slices.to_vec() }.in_order()
         };
         for slices in [&[0, 1, 2, 3, 4][..], &[4, 3, 2, 1, 0], &[1, 2, 3, 4, 0], &[2, 0, 1, 4, 3]] {
             assert_eq!(of(slices), Some(vec![0, 1, 10, 11, 20, 21, 30, 31, 40, 41]), "{slices:?}");

@@ -15,9 +15,10 @@ use super::super::fields::Fields;
 use super::super::loaded::Loaded;
 use super::super::numbers::TextEnd;
 use super::super::orientation::unit_directions;
-use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::super::source::{invalid, io_error, number, three};
+use super::super::voxel::Voxel;
 use super::super::xml;
 use super::blocks::{Base64, Blocks, Compressor, HeaderType};
 use super::warn_of_choice;
@@ -58,7 +59,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         return Err(header.image.invalid("NumberOfComponents", found, "at most 4294967295 numbers"));
     };
     let stream = header.open(path, access, array, &Samples { dims: side, ..samples })?;
-    let values = stream.series(&samples, &series, false)?;
+    let values = stream.series::<T>(&samples, &series, false)?;
     Ok(Loaded { spacing: Some(spacing), series, ..Loaded::new(dims, kind, values) })
 }
 

@@ -10,8 +10,9 @@ use super::super::access::Access;
 use super::super::fields::Fields;
 use super::super::loaded::Loaded;
 use super::super::numbers::TextEnd;
-use super::super::samples::{SIZES, SampleType, Samples, Stream, Voxel, dims_of};
+use super::super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::super::source::{MAX_HEADER, Source, invalid, io_error, number, shown, three};
+use super::super::voxel::Voxel;
 
 /// The keywords that may follow an array.
 const KEYWORDS: &[&str] = &[
@@ -45,7 +46,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         check_rest(path, access, file.left()?, &samples)?;
         Stream::raw(file)?
     };
-    let loaded = Loaded::new(dims, kind, stream.samples(&samples, !is_text)?);
+    let loaded = Loaded::new(dims, kind, stream.samples::<T>(&samples, !is_text)?);
     Ok(Loaded { spacing, ..loaded })
 }
 

@@ -16,6 +16,7 @@ use super::super::loaded::Loaded;
 use super::super::refused;
 use super::super::series::{MAX_CHANNELS, Series};
 use super::super::source::invalid;
+use super::super::voxel::Voxel;
 use super::array::ZarrArray;
 use super::axes::Axis;
 use super::display;
@@ -115,7 +116,7 @@ impl Image {
     }
 
     /// Values of a level with what the metadata state about all of them.
-    pub(super) fn stated<T>(&self, level: usize, values: Vec<T>) -> Loaded<T> {
+    pub(super) fn stated<T: Voxel>(&self, level: usize, values: T::Many) -> Loaded<T> {
         let Level { array, grid } = &self.levels[level];
         Loaded {
             unit: self.unit.clone(),

@@ -26,10 +26,11 @@ use self::array::Region;
 use self::image::{Image, Level};
 use super::access::Access;
 use super::loaded::{Levels, Loaded};
-use super::samples::{SIZES, Voxel, dims_of};
+use super::samples::{SIZES, dims_of};
 use super::source::invalid;
 use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
-use super::{Grid, StoreFacts, VolumeError};
+use super::voxel::Voxel;
+use super::{Grid, StoreFacts, Values, VolumeError};
 use crate::parallel;
 use crate::stats::StoreCounts;
 
@@ -66,7 +67,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let spacing = Some(level.grid.spacing);
     let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
     let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid, reads });
-    Ok(Loaded { spacing, levels, ..image.stated(number, values) })
+    Ok(Loaded { spacing, levels, ..image.stated::<T>(number, values.into()) })
 }
 
 /// The grids of an image's levels, from the finest.
@@ -116,7 +117,7 @@ pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result
     let levels = image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() });
     let levels: Vec<StoreLevel> = levels.collect();
     let spacing = Some(image.levels[0].grid.spacing);
-    let stated = Loaded { spacing, ..image.stated::<f32>(0, Vec::new()) };
+    let stated = Loaded { spacing, ..image.stated::<f32>(0, Values::default()) };
     let time = u64::from(selection.time.unwrap_or(0));
     let store = |(at, channel): (usize, u32)| {
         let facts = facts_of_channel(stated.facts(format, channel as usize), at);

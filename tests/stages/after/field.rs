@@ -14,7 +14,7 @@ use sheetsplat::internals::plane_geometry::PlaneGeometry;
 use sheetsplat::internals::quad_plan::tile_grid;
 use sheetsplat::internals::reference::after::{Frame, Sample};
 use sheetsplat::settings::Gradient;
-use sheetsplat::volume::Grid;
+use sheetsplat::volume::{Grid, ValueSlice};
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
 use super::values::records;
@@ -72,7 +72,7 @@ fn any_list(prepared: &Prepared<'_>) -> CullList {
     let buffers = CullBuffers {
         frame: &uniform,
         groups: &uniform,
-        values: &VolumeTexture::upload(device, prepared.gpu.queue(), &[0.0]).unwrap().view,
+        values: &VolumeTexture::upload(device, prepared.gpu.queue(), ValueSlice::F32(&[0.0])).unwrap().view,
         has_holes: false,
         channels: 1,
         colors: None,

@@ -34,7 +34,7 @@ use crate::init;
 fn head(spacing: [f64; 3], has_holes: bool) -> Volume {
     let head = builtin::volume("head:16").unwrap();
     let hole = |index: usize| has_holes && index % 37 == 5;
-    let values = head.values().iter().enumerate().map(|(index, &value)| if hole(index) { f32::NAN } else { value });
+    let values = head.values().iter().enumerate().map(|(index, value)| if hole(index) { f32::NAN } else { value });
     Volume::new("head", head.dims(), DVec3::from(spacing), values.collect()).unwrap()
 }
 

@@ -24,7 +24,7 @@ use sheetsplat::internals::reference::Geometry;
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Classification, Method, Order, Ramp, TransferFunction, Window};
-use sheetsplat::volume::Grid;
+use sheetsplat::volume::{Grid, ValueSlice};
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat};
 
 use crate::common::{Random, SPACINGS, camera, gpu, random_eye, scene};
@@ -71,7 +71,7 @@ impl<'a> Culling<'a> {
     pub(crate) fn new(
         gpu: &'a GpuHeadless,
         (stage, kind): (&'a Cull, Groups),
-        (grid, values, labels): (&Grid, &[f32], Option<&[u16]>),
+        (grid, values, labels): (&Grid, ValueSlice<'_>, Option<&[u16]>),
         voxels: &[u32],
         transfer: &TransferFunction,
         scene: &Scene,
@@ -227,7 +227,7 @@ impl Case {
         let values = vec![1.0; self.grid.dims.element_product() as usize];
         // Voxels whose decisions may differ in f32 are removed, which changes their bricks.
         for _ in 0..30 {
-            let volume = (&self.grid, &values[..], None);
+            let volume = (&self.grid, ValueSlice::F32(&values), None);
             let culling = Culling::new(gpu, (stage, self.kind), volume, &self.voxels, &transfer, &self.scene);
             let (_, unsure) = self.expected(&culling, masks);
             if unsure.is_empty() {

@@ -93,7 +93,7 @@ fn frames() {
             let (mut volume, transfer) = noise(&mut random, dims, frame.1, opacity, points);
             scene.transfer = transfer;
             if random.bits().is_multiple_of(3) {
-                let sample = |&value: &f32| if random.bits().is_multiple_of(4) { f32::NAN } else { value };
+                let sample = |value: f32| if random.bits().is_multiple_of(4) { f32::NAN } else { value };
                 let values = volume.values().iter().map(sample).collect();
                 volume = Volume::new("holes", dims, volume.spacing(), values).unwrap();
             }

@@ -21,7 +21,7 @@ use sheetsplat::internals::quad_plan::tile_grid;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{FootprintForm, Method};
-use sheetsplat::volume::Grid;
+use sheetsplat::volume::{Grid, ValueSlice};
 use sheetsplat::wgpu::{self, BufferUsages, TextureFormat, TextureUsages};
 
 use crate::common::compare::{apart, assert_at_most, largest};
@@ -47,7 +47,7 @@ impl<'a> Stages<'a> {
         let shared = CullBuffers {
             frame: &uniform,
             groups: &uniform,
-            values: &VolumeTexture::upload(device, gpu.queue(), &[0.0]).unwrap().view,
+            values: &VolumeTexture::upload(device, gpu.queue(), ValueSlice::F32(&[0.0])).unwrap().view,
             has_holes: false,
             channels: 1,
             colors: None,

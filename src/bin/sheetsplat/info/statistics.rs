@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 use sheetsplat::appearance::histogram;
+use sheetsplat::volume::ValueSlice;
 
 /// The number of values that one thread processes at a time.
 const CHUNK: usize = 1 << 20;
@@ -10,17 +11,18 @@ const CHUNK: usize = 1 << 20;
 const BINS: usize = 256;
 
 /// The minimum, maximum and mean of the finite values, the same in every run.
-pub(super) fn extent_and_mean(values: &[f32]) -> [f64; 3] {
-    let of_chunk = |chunk: &[f32]| {
+pub(super) fn extent_and_mean(values: ValueSlice<'_>) -> [f64; 3] {
+    let of_chunk = |chunk: ValueSlice<'_>| {
         let start = [f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0];
         let finite = chunk.iter().filter(|value| !value.is_nan());
-        finite.fold(start, |[least, largest, sum, count], &value| {
+        finite.fold(start, |[least, largest, sum, count], value| {
             let value = f64::from(value);
             [least.min(value), largest.max(value), sum + value, count + 1.0]
         })
     };
     // The sums are collected, so that they are added in a fixed order.
-    let chunks: Vec<[f64; 4]> = values.par_chunks(CHUNK).map(of_chunk).collect();
+    let chunks: Vec<ValueSlice<'_>> = values.chunks(CHUNK).collect();
+    let chunks: Vec<[f64; 4]> = chunks.into_par_iter().map(of_chunk).collect();
     let [least, largest, sum, count] = chunks
         .into_iter()
         .reduce(|[a, b, c, d], [least, largest, sum, count]| [a.min(least), b.max(largest), c + sum, d + count])
@@ -35,7 +37,7 @@ pub(super) struct Histogram {
 }
 
 impl Histogram {
-    pub(super) fn new(values: &[f32], [low, high]: [f64; 2]) -> Self {
+    pub(super) fn new(values: ValueSlice<'_>, [low, high]: [f64; 2]) -> Self {
         let scale = BINS as f64 / (high - low);
         let bin = |value: f32| Some((((f64::from(value) - low) * scale) as usize).min(BINS - 1));
         Self { range: [low, high], counts: histogram(values, BINS, bin) }
@@ -81,18 +83,18 @@ mod tests {
 
     #[test]
     fn extents_and_means() {
-        assert_eq!(extent_and_mean(&[3.0, -1.0, 4.0]), [-1.0, 4.0, 2.0]);
-        assert_eq!(extent_and_mean(&[f32::NAN, 3.0, -1.0, f32::NAN, 4.0]), [-1.0, 4.0, 2.0]);
+        assert_eq!(extent_and_mean(ValueSlice::F32(&[3.0, -1.0, 4.0])), [-1.0, 4.0, 2.0]);
+        assert_eq!(extent_and_mean(ValueSlice::F32(&[f32::NAN, 3.0, -1.0, f32::NAN, 4.0])), [-1.0, 4.0, 2.0]);
     }
 
     #[test]
     fn iso_values_lie_between_classes() {
         let peak = |center: f32, count: u16| (0..count).map(move |at| center + f32::from(at % 21) - 10.0);
         let three: Vec<f32> = peak(10.0, 5000).chain(peak(200.0, 3000)).chain(peak(700.0, 500)).collect();
-        let isos = Histogram::new(&three, [0.0, 710.0]).iso_values();
+        let isos = Histogram::new((&three).into(), [0.0, 710.0]).iso_values();
         assert!(isos.len() == 2 && (20.0..190.0).contains(&isos[0]) && (210.0..690.0).contains(&isos[1]), "{isos:?}");
         let two: Vec<f32> = [vec![0.0; 100], vec![255.0; 3]].concat();
-        let isos = Histogram::new(&two, [0.0, 255.0]).iso_values();
+        let isos = Histogram::new((&two).into(), [0.0, 255.0]).iso_values();
         assert!(isos.len() == 1 && (isos[0] - 127.5).abs() < 1.0, "{isos:?}");
     }
 }

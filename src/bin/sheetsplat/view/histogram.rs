@@ -1,5 +1,7 @@
 //! Counts of a volume's values.
 
+use sheetsplat::volume::ValueSlice;
+
 /// The number of bars in a [`Histogram`].
 const BINS: usize = 256;
 
@@ -11,10 +13,10 @@ pub(super) struct Histogram {
 
 impl Histogram {
     /// Counts finite values within a range that is not empty.
-    pub(super) fn new(values: &[f32], [lo, hi]: [f64; 2]) -> Self {
+    pub(super) fn new(values: ValueSlice<'_>, [lo, hi]: [f64; 2]) -> Self {
         let mut counts = [0_u64; BINS];
         let scale = BINS as f64 / (hi - lo);
-        for &value in values.iter().filter(|value| !value.is_nan()) {
+        for value in values.iter().filter(|value| !value.is_nan()) {
             counts[(((f64::from(value) - lo) * scale) as usize).min(BINS - 1)] += 1;
         }
         let logarithm = |count: u64| (count as f64).ln_1p();
@@ -24,9 +26,9 @@ impl Histogram {
 }
 
 /// The minimum and maximum finite value.
-pub(super) fn extent(values: &[f32]) -> [f64; 2] {
+pub(super) fn extent(values: ValueSlice<'_>) -> [f64; 2] {
     // `f32::min` and `f32::max` ignore holes (NaN).
-    let (lo, hi) = values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), &v| (lo.min(v), hi.max(v)));
+    let (lo, hi) = values.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
     [lo.into(), hi.into()]
 }
 
@@ -37,8 +39,9 @@ mod tests {
     #[test]
     fn bars_stand_where_the_values_are_and_grow_with_the_logarithm() {
         let values: Vec<f32> = [vec![f32::NAN; 9999], vec![10.0; 999], vec![20.0; 9], vec![15.1; 99]].concat();
-        assert_eq!(extent(&values), [10.0, 20.0]);
-        let Histogram { heights } = Histogram::new(&values, extent(&values));
+        let values = ValueSlice::from(&values);
+        assert_eq!(extent(values), [10.0, 20.0]);
+        let Histogram { heights } = Histogram::new(values, extent(values));
         assert_eq!(heights.len(), BINS);
         let third = 1.0 / 3.0;
         for (bin, expected) in [(0, 1.0), (BINS - 1, third), (BINS * 51 / 100, 2.0 * third)] {

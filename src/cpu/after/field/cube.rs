@@ -8,6 +8,7 @@ use glam::UVec3;
 use super::{Cube, Field};
 use crate::cpu::after::differences::{Differences, Neighbours};
 use crate::cpu::vector::{LANES, columns, exp2};
+use crate::volume::{Sample, ValueSlice, for_type};
 
 /// Voxels along a side.
 pub(super) const SIDE: usize = 4;
@@ -92,6 +93,11 @@ impl Field<'_> {
     /// N and `Σ (c - base)·g`, each as four numbers to be added. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn cube_sums<S: Simd>(&self, simd: S, cube: &Cube) -> [f32x4<S>; 2] {
+        for_type!(ValueSlice, self.coefficients, all => self.cube_sums_of(simd, cube, all))
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn cube_sums_of<S: Simd, T: Sample>(&self, simd: S, cube: &Cube, all: &[T]) -> [f32x4<S>; 2] {
         let weights = Weights::new(simd, self, cube.rest);
         let [step_y, step_z] = self.steps();
         let first = cube.index;
@@ -99,7 +105,7 @@ impl Field<'_> {
         let (mut total, mut sum) = (zero, zero);
         for z in 0..SIDE {
             let weight = weights.at(simd, z);
-            let c = rows(simd, self.coefficients, first + z * step_z, step_y) - self.base;
+            let c = rows(simd, all, first + z * step_z, step_y) - self.base;
             total += weight;
             sum += weight * c;
         }
@@ -151,7 +157,7 @@ impl Field<'_> {
         let exponents = squared * self.exponent;
         let (along, _) = gaussian(simd, exponents.combine(exponents)).split();
         let zero = f32x4::splat(simd, 0.0);
-        let four = |at: usize| f32x4::from_slice(simd, &values[at..at + SIDE]);
+        let four = |at: usize| f32x4::load_array(simd, values.run(at));
         let [mut total, mut x, mut y, mut z] = [zero; 4];
         for (row, index) in self.rows_of(cube).enumerate() {
             let is_near = squared.simd_lt(f32x4::splat(simd, rows.limits[row]));
@@ -187,6 +193,11 @@ impl Field<'_> {
     /// `Σ (c - f)·g·δ / N`, given f.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn cube_moments<S: Simd>(&self, simd: S, cube: &Cube, number: f32) -> [f32; 3] {
+        for_type!(ValueSlice, self.coefficients, all => self.cube_moments_of(simd, (cube, number), all))
+    }
+
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn cube_moments_of<S: Simd, T: Sample>(&self, simd: S, (cube, number): (&Cube, f32), all: &[T]) -> [f32; 3] {
         let weights = Weights::new(simd, self, cube.rest);
         let [step_y, step_z] = self.steps();
         let first = cube.index;
@@ -195,7 +206,7 @@ impl Field<'_> {
         for plane in 0..SIDE {
             let weight = weights.at(simd, plane);
             total += weight;
-            let c = rows(simd, self.coefficients, first + plane * step_z, step_y) - self.base;
+            let c = rows(simd, all, first + plane * step_z, step_y) - self.base;
             let weighted = weight * (c * self.scale - number);
             x += weighted * weights.offsets[0];
             y += weighted * weights.offsets[1];
@@ -221,12 +232,15 @@ fn gaussian<S: Simd>(simd: S, exponent: f32x8<S>) -> f32x8<S> {
 
 /// Four rows of four voxels, given the index of the first one and the step from row to row.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn rows<S: Simd>(simd: S, all: &[f32], at: usize, step: usize) -> f32x16<S> {
-    let row = |at: usize| &all[at..at + SIDE];
-    let [a, b, c, d] = [row(at), row(at + step), row(at + 2 * step), row(at + 3 * step)];
-    let low = f32x4::from_slice(simd, a).combine(f32x4::from_slice(simd, b));
-    let high = f32x4::from_slice(simd, c).combine(f32x4::from_slice(simd, d));
-    low.combine(high)
+fn rows<S: Simd, T: Sample>(simd: S, all: &[T], at: usize, step: usize) -> f32x16<S> {
+    let row = |at: usize| {
+        let row = &all[at..at + SIDE];
+        [row[0], row[1], row[2], row[3]]
+    };
+    // Side by side before they are converted, so that one instruction converts as many as there are lanes.
+    let [[a, b, c, d], [e, f, g, h]] = [row(at), row(at + step)];
+    let [[i, j, k, l], [m, n, o, p]] = [row(at + 2 * step), row(at + 3 * step)];
+    f32x16::load_array(simd, [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p].map(T::to_f32))
 }
 
 /// Four sums of four of sixteen numbers each.

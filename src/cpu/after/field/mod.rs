@@ -22,7 +22,7 @@ use crate::after::normalization::Normalization;
 use crate::cpu::count::bits;
 use crate::cpu::vector::LANES;
 use crate::settings::shading::Gradient;
-use crate::volume::Volume;
+use crate::volume::{ValueSlice, Volume};
 
 /// The minimum sum of weights of a point that has a value.
 const MIN_WEIGHT: f32 = 1e-3;
@@ -40,7 +40,7 @@ pub(super) struct Field<'a> {
     volume: &'a Volume,
     pub(super) extent: Extent,
     /// c for each of them, in memory order; NaN at holes.
-    coefficients: &'a [f32],
+    coefficients: ValueSlice<'a>,
     /// Those of the voxels' own colours, if they have any.
     colors: Option<ColorsOf<'a>>,
     /// The differences of the values, if they are kept.
@@ -99,7 +99,7 @@ impl<'a> Field<'a> {
     /// `extent` tells where in the volume the voxels at hand are.
     pub(super) fn new(
         (volume, extent): (&'a Volume, Extent),
-        (coefficients, colors): (&'a [f32], Option<ColorsOf<'a>>),
+        (coefficients, colors): (ValueSlice<'a>, Option<ColorsOf<'a>>),
         differences: Option<&'a Differences>,
         numbers: Normalization,
         (radius, falloff): (f64, f64),
@@ -275,7 +275,7 @@ mod tests {
         let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
         let scene = Scene::from_volume(VolumeSource::Builtin("head:8".to_owned()), &sets).unwrap();
         let (splatting, grid) = (&scene.splatting, volume.grid());
-        let numbers = Normalization::of(volume.values().iter().copied()).unwrap();
+        let numbers = Normalization::of(volume.values().iter()).unwrap();
         let kernel = (splatting.radius, splatting.falloff);
         let whole = (volume, Extent::whole(grid));
         let differences = Differences::new(volume).unwrap();
@@ -365,7 +365,7 @@ mod tests {
         };
         let colors: Vec<[f32; 4]> = (0..dims.element_product()).map(|_| color(&mut state)).collect();
         let volume = Volume::from_colors("random", dims, spacing, (&colors, SampleType::U8)).unwrap();
-        let numbers = Normalization::of(volume.values().iter().copied()).unwrap();
+        let numbers = Normalization::of(volume.values().iter()).unwrap();
         for (kernel, interpolation) in [
             ([2.0, 2.0], Interpolation::Smooth),
             ([3.2, 0.7], Interpolation::Smooth),

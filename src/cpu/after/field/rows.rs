@@ -10,6 +10,7 @@ use crate::cpu::after::colors::Color;
 use crate::cpu::after::held::Extent;
 use crate::cpu::after::low_pass::LowPass;
 use crate::cpu::vector::{LANES, exp2, iota};
+use crate::volume::ValueSlice;
 
 /// Slack around the ends of rows for rounding in f64, in voxels: every voxel is tested again.
 const SLACK: f64 = 1e-6;
@@ -67,7 +68,7 @@ impl Field<'_> {
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
-                if self.coefficients[self.nearest(at)].is_nan() {
+                if self.coefficients.at(self.nearest(at)).is_nan() {
                     return f32::NAN;
                 }
                 let zero = f32x8::splat(simd, 0.0);
@@ -101,7 +102,7 @@ impl Field<'_> {
                         let of_lanes = row.lanes(simd, self, from).weights.to_array();
                         let voxels = row.index + from..row.index + row.count;
                         for (index, weight) in voxels.zip(of_lanes) {
-                            if weight > 0.0 && !self.coefficients[index].is_nan() {
+                            if weight > 0.0 && !self.coefficients.at(index).is_nan() {
                                 weights += weight;
                                 sums += f32x4::load_array(simd, colors.at(index)) * weight;
                             }
@@ -246,16 +247,14 @@ impl<S: Simd> Sums<S> {
 
 /// Eight numbers, from one on; NaN beyond the last one.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn load<S: Simd>(simd: S, all: &[f32], at: usize) -> f32x8<S> {
-    match all.get(at..at + LANES) {
-        Some(eight) => f32x8::from_slice(simd, eight),
-        None => {
-            let mut eight = [f32::NAN; LANES];
-            let rest = all.get(at..).unwrap_or_default();
-            eight[..rest.len()].copy_from_slice(rest);
-            f32x8::load_array(simd, eight)
-        }
+fn load<S: Simd>(simd: S, all: ValueSlice<'_>, at: usize) -> f32x8<S> {
+    let count = all.len();
+    if at + LANES <= count {
+        return f32x8::load_array(simd, all.run(at));
     }
+    let mut eight = [f32::NAN; LANES];
+    eight.iter_mut().zip(all.slice(at.min(count)..count)).for_each(|(number, c)| *number = c);
+    f32x8::load_array(simd, eight)
 }
 
 /// The sum of eight numbers, in the same order on every machine.
