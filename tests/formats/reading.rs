@@ -151,7 +151,7 @@ fn memory_is_limited_in_every_format() {
         ("imagej-large.tif", 4, 0),
         ("series", 4, 0),
         ("frames.dcm", 4, 0),
-        ("rle.dcm", 2, 0),
+        ("rle.dcm", 4, 0),
         ("text.vti", 2, 0),
         ("appended.vti", 1, 0),
         // For a block.
