@@ -76,7 +76,7 @@ impl Layer {
             }
             List::After(coefficients) => {
                 for (of, coefficients) in channels(volume, transfer).zip(&mut *coefficients) {
-                    coefficients.prepare_gradients(of.0, scene);
+                    coefficients.prepare(of.0, scene);
                     coefficients.look(of, scene.splatting.compositing, &view);
                 }
                 let frames = channels(volume, transfer).zip(&*coefficients).enumerate();

@@ -244,6 +244,7 @@ impl Values {
     }
 
     /// Exchanges two runs of `count` values, of which the first one ends before the other begins.
+    #[cfg(feature = "tiff")]
     pub(super) fn swap(&mut self, first: usize, other: usize, count: usize) {
         for_type!(Self, self, values => swap(values, first, other, count));
     }
@@ -464,6 +465,7 @@ fn push<T: Kept>(all: &mut Vec<T>, values: &[f32]) -> Result<(), TryReserveError
 }
 
 /// Exchanges two runs of a slice, of which the first one ends before the other begins.
+#[cfg(feature = "tiff")]
 pub(super) fn swap<T>(values: &mut [T], first: usize, other: usize, count: usize) {
     let (before, after) = values.split_at_mut(other);
     before[first..][..count].swap_with_slice(&mut after[..count]);

@@ -27,6 +27,7 @@ pub(crate) trait Many<T>: Default + Sync + From<Vec<T>> {
     fn shrink_to_fit(&mut self);
 
     /// Exchanges two runs of `count` voxels, of which the first one ends before the other begins.
+    #[cfg(feature = "tiff")]
     fn swap(&mut self, first: usize, other: usize, count: usize);
 
     /// Appends those of others that have some indices.
@@ -70,6 +71,7 @@ impl Many<f32> for Values {
         self.shrink_to_fit();
     }
 
+    #[cfg(feature = "tiff")]
     fn swap(&mut self, first: usize, other: usize, count: usize) {
         self.swap(first, other, count);
     }
@@ -99,6 +101,7 @@ impl Many<u16> for Vec<u16> {
         self.shrink_to_fit();
     }
 
+    #[cfg(feature = "tiff")]
     fn swap(&mut self, first: usize, other: usize, count: usize) {
         values::swap(self, first, other, count);
     }

@@ -32,6 +32,9 @@ pub(in crate::cpu) struct Coefficients {
     pub(super) numbers: Normalization,
     /// Of `interpolation = "exact"`; else they are the values.
     exact: Option<Arc<[f32]>>,
+    /// The values as `f32`, which are read faster, once a second frame has been drawn.
+    wide: Option<Arc<[f32]>>,
+    has_drawn: bool,
     /// Of volumes of colours.
     colors: Option<Colors>,
     /// Of the values, which only gradients need.
@@ -42,6 +45,9 @@ pub(in crate::cpu) struct Coefficients {
     /// Whether the transfer function or the compositing have changed since.
     is_stale: bool,
 }
+
+/// The maximum number of voxels of a volume whose values are kept as `f32` beside their narrower form, which then take 64 MiB.
+const MAX_WIDE: usize = 1 << 24;
 
 /// The differences of a volume's values.
 #[derive(Clone, Debug)]
@@ -91,12 +97,22 @@ impl Coefficients {
         let all = exact.as_deref().map_or(volume.values(), ValueSlice::from);
         let numbers = Normalization::of(all.iter()).unwrap_or(Normalization::new([0.0; 2]));
         let colors = Colors::new(volume, splatting.interpolation, kernel)?;
-        Ok(Self { numbers, exact, colors, differences: Kept::Unused, ranges: None, shown: None, is_stale: false })
+        Ok(Self {
+            numbers,
+            exact,
+            wide: None,
+            has_drawn: false,
+            colors,
+            differences: Kept::Unused,
+            ranges: None,
+            shown: None,
+            is_stale: false,
+        })
     }
 
     /// All of them, in memory order; NaN at holes.
     pub(in crate::cpu) fn all<'a>(&'a self, volume: &'a Volume) -> ValueSlice<'a> {
-        self.exact.as_deref().map_or(volume.values(), ValueSlice::from)
+        self.exact.as_deref().or(self.wide.as_deref()).map_or(volume.values(), ValueSlice::from)
     }
 
     /// The coefficients of the voxels' own colours, if they have any.
@@ -104,8 +120,13 @@ impl Coefficients {
         self.colors.as_ref().and_then(|colors| colors.of(volume))
     }
 
-    /// Prepares for a frame of a scene what its gradients need.
-    pub(in crate::cpu) fn prepare_gradients(&mut self, volume: &Volume, scene: &Scene) {
+    /// Prepares for a frame of a scene what it reads.
+    pub(in crate::cpu) fn prepare(&mut self, volume: &Volume, scene: &Scene) {
+        let (is_first, values) = (!std::mem::replace(&mut self.has_drawn, true), volume.values());
+        let is_narrow = !matches!(values, ValueSlice::F32(_));
+        if !is_first && is_narrow && self.exact.is_none() && self.wide.is_none() && values.len() <= MAX_WIDE {
+            self.wide = Some(values.iter().collect());
+        }
         let is_kept = scene.shading.gradient == Gradient::Differences && Field::is_narrow(scene.splatting.radius);
         if !(scene.shading.enabled && is_kept) {
             return;
