@@ -94,6 +94,41 @@ def test_an_index_spares_chunks(ball: pathlib.Path, tmp_path: pathlib.Path) -> N
         View(ball, memory=MEMORY, index=tmp_path / "missing.index")
 
 
+def test_channels_are_streamed(tmp_path: pathlib.Path) -> None:
+    z, y, x = np.ogrid[-1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j]
+    values = [np.clip(300 * (0.6 - np.sqrt((x - at) ** 2 + y * y + z * z)), 0, 180).astype(np.uint8) for at in (-0.2, 0.3)]
+    path = tmp_path / "two.zarr"
+    path.mkdir()
+    metadata = {
+        "zarr_format": 2,
+        "shape": [2] + [SIDE] * 3,
+        "chunks": [1] + [CHUNK] * 3,
+        "dtype": "|u1",
+        "order": "C",
+        "compressor": None,
+        "filters": None,
+        "fill_value": 0,
+    }
+    (path / ".zarray").write_text(json.dumps(metadata))
+    for channel, *at in np.ndindex(2, *[SIDE // CHUNK] * 3):
+        chunk = values[channel][tuple(slice(CHUNK * a, CHUNK * (a + 1)) for a in at)]
+        (path / ".".join(map(str, (channel, *at)))).write_bytes(chunk.tobytes())
+    opacity = [[0, 0], [60, 0], [200, 0.8]]
+    look: dict[str, Any] = {key: LOOK[key] for key in ("image", "camera", "splatting")}
+    channels = [{"transfer": {"color": [[0, color]], "opacity": opacity}} for color in ([1, 0, 0], [0, 1, 0])]
+    whole, streamed = View(path, **look, channel=channels), View(path, memory="6MiB", **look, channel=channels)
+    assert (whole.volume.streamed, streamed.volume.streamed, streamed.volume.channels) == (False, True, 2)
+    pictures = [view.render() for view in (whole, streamed)]
+    np.testing.assert_allclose(*[np.asarray(picture) for picture in pictures], rtol=0, atol=1e-6)
+    total = 2 * (SIDE // CHUNK) ** 3
+    assert 0 < pictures[1].stats["chunks_read"] <= pictures[1].stats["chunks_total"] == total
+    channels[0]["visible"] = False
+    hidden = View(path, memory="6MiB", **look, channel=channels).render()
+    assert 0 < hidden.stats["chunks_read"] <= total / 2
+    parts = [streamed.part(slabs=slabs) for slabs in ((-1000, 0), (0, 1000))]
+    np.testing.assert_allclose(np.asarray(sheetsplat.merge(parts)), np.asarray(pictures[1]), rtol=0, atol=1e-6)
+
+
 def test_what_needs_all_values_is_refused(ball: pathlib.Path) -> None:
     volume = Volume(ball, memory=MEMORY)
     assert volume.info()["streamed"] and volume.info()["max"] <= 250

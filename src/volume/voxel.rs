@@ -3,7 +3,7 @@
 use std::collections::TryReserveError;
 
 use super::samples::{Sample, SampleType};
-use super::values::{self, Values};
+use super::values::Values;
 
 /// Voxels in memory, where many together may take fewer bits than each alone.
 pub(crate) trait Many<T>: Default + Sync + From<Vec<T>> {
@@ -103,7 +103,7 @@ impl Many<u16> for Vec<u16> {
 
     #[cfg(feature = "tiff")]
     fn swap(&mut self, first: usize, other: usize, count: usize) {
-        values::swap(self, first, other, count);
+        super::values::swap(self, first, other, count);
     }
 }
 
