@@ -5,7 +5,7 @@
 // Needs gather/amounts.wgsl: overlapped_sheets, placed, screen_box, sections_here.
 // Needs gather/economies.wgsl: ECONOMIES.
 // Needs gather/patch.wgsl: ORDER, PARALLELOGRAM, PASSES_PER_FIND, PERSPECTIVE, SHEETS, drawn, first_px, gather, gathered, lane, lanes, open, passes, sheet_group.
-// Needs gather/queue.wgsl: enqueue, queue_amounts, queue_count, queue_first, queue_points, queue_size.
+// Needs gather/queue.wgsl: QUEUE_COLORS, enqueue, queue_amounts, queue_colors, queue_count, queue_first, queue_points, queue_size.
 // Needs gather/region.wgsl: blocks_in_box, blocks_in_parallelogram, bounds_of.
 // Needs gather/walk.wgsl: Found, SearchBounds, next_voxels.
 // Needs gather_planes.wgsl: ECONOMIES, FIRST_PLANE, overlapped_sheets, placed, screen_box, sections_here.
@@ -88,6 +88,7 @@ fn keep_voxels() {
         let slot = queue_first + min(i + lane, count - 1u);
         let point = queue_points[slot];
         let amount = queue_amounts[slot];
+        let color = queue_colors[min(slot, QUEUE_COLORS - 1u)];
         let p = vec4f(bitcast<vec3f>(point.xyz), 1.0);
         let sheets = overlapped_sheets(p);
         let is_in = i + lane < count && is_drawn_here(p, sheets);
@@ -95,6 +96,9 @@ fn keep_voxels() {
         let kept_slot = enqueue(is_in, point.w, p, blocks_here(p));
         if is_in {
             queue_amounts[kept_slot] = amount;
+            if QUEUE_COLORS > 1u {
+                queue_colors[kept_slot] = color;
+            }
             count_drawn(point.w, p, sheets, false);
         }
     }

@@ -384,6 +384,10 @@ pub fn grid(size: [u32; 2]) -> [u32; 2] {
 /// the passes.
 fn dispatches(starts: &[u32], [layers, groups]: [usize; 2], passes: &Passes) -> Result<u32, TileCapacityError> {
     let most = u64::from(passes.most);
+    if passes.per_group >= passes.most {
+        let what = "passes through loops in one sheet group";
+        return Err(TileCapacityError { what, required: passes.per_group.into(), actual: most });
+    }
     let patches = (starts.len() - 1) / (layers * groups.max(1));
     let of_patch = |patch: usize| {
         let (mut dispatches, mut taken) = (1, 0);

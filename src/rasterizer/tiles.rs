@@ -79,10 +79,10 @@ impl TileRasterizer {
             None => (None, None, None),
         };
         let layers: Vec<&[Brick]> = inputs.lists().iter().map(BrickLists::all).collect();
-        let lists = inputs.lists().iter().map(|layer| layer.lists.len()).sum();
+        let are_joined = !matches!(inputs.lists(), [only] if only.lists.len() == 1);
         let (binned, is_new) = Binned::renewed(&limits, inputs, &layers, old_binned)?;
         let results = GatheredLayout::new(&request.view, &binned.bins, count(&layers));
-        let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), lists)?;
+        let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), are_joined)?;
         let (range_bytes, dispatches) = patch_ranges(&limits, request);
         let contents = (&binned.bins, &results, &range_bytes[..]);
         let buffers = TileBuffers::filled(inputs, spec, contents, &layers, (old_buffers, is_new))?;
@@ -147,8 +147,9 @@ impl TileRasterizer {
     ) -> Result<FrameEstimate, RenderError> {
         let bins = bins(limits, request, layers, all_search_passes(request, by_label))?;
         let results = GatheredLayout::new(&request.view, &bins, count(layers));
+        let are_joined = layers.len() != 1 || lists != 1;
         let mut buffers: Vec<BufferSpec> =
-            TileBuffers::specs(limits, request, (&bins, &results), lists)?.all().collect();
+            TileBuffers::specs(limits, request, (&bins, &results), are_joined)?.all().collect();
         buffers.extend(request.after.iter().flat_map(|_| Carried::specs(request)));
         let bands = request.bands.len() as u64 * GatherBand::estimate(bins.dispatches);
         let groups = bins.groups as usize;
@@ -311,12 +312,12 @@ impl TileBuffers<Buffer> {
 }
 
 impl TileBuffers<BufferSpec> {
-    /// The specs for a view of a volume whose bricks are divided among `lists` lists.
+    /// The specs for a view of a volume; `are_joined` states whether bricks are in several lists, or in none, and need a buffer for all.
     fn specs(
         limits: &Limits,
         request: &FrameRequest,
         (bins, results): (&PatchBins, &GatheredLayout),
-        lists: usize,
+        are_joined: bool,
     ) -> Result<Self, RenderError> {
         check_workgroup_memory(limits, request)?;
         let (binding, storage) = (binding(limits), BufferUsages::STORAGE);
@@ -326,10 +327,8 @@ impl TileBuffers<BufferSpec> {
         };
         // Bindings may not be empty.
         let brick_bytes = u64::from(results.bricks.max(1)) * size_of::<Brick>() as u64;
-        let brick_bytes = match lists {
-            1 => None,
-            _ => Some(within("the bricks of the tile rasterizer", brick_bytes)?),
-        };
+        let within_binding = || within("the bricks of the tile rasterizer", brick_bytes);
+        let brick_bytes = are_joined.then(within_binding).transpose()?;
         // The stage `join` always binds a buffer of first hits, which must not be empty even where no first hits are requested.
         let gathered = results.hits_byte() + request.hit_bytes().max(size_of::<u32>() as u64);
         let gathered = within("the tile rasterizer's counts and first hits", gathered)?;

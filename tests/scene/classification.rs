@@ -46,7 +46,7 @@ fn presets_and_chosen_transfer_functions_are_classified_after_splatting() {
         ("", &["splatting.interpolation=exact", "splatting.falloff=0.9"], Before),
         ("", &["splatting.falloff=0.9"], After),
         ("", &["splatting.rasterizer=tiles"], After),
-        ("", &["splatting.rasterizer=tiles", "splatting.compositing=maximum"], Before),
+        ("", &["splatting.rasterizer=tiles", "splatting.compositing=maximum"], After),
         ("", &["splatting.compositing=maximum"], After),
     ] {
         let scene = scene(text, sets);
