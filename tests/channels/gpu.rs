@@ -191,7 +191,9 @@ fn a_channel_without_opacity_changes_nothing() {
                 .map(|(volume, scene)| gpu.render_volume(volume, &scene).unwrap().image);
             let what = format!("{classification:?} {compositing:?} by {rasterizer:?}");
             assert_at_most(largest_difference(&both, &one), 1e-6, &what);
-            assert!(one.pixels.iter().any(|pixel| *pixel != one.pixels[0]), "{what}");
+            // The second channel is nowhere opaque enough for a surface after splatting.
+            let shows = one.pixels.iter().any(|pixel| *pixel != one.pixels[0]);
+            assert!(shows || compositing == Compositing::Surface, "{what}");
         }
     }
 }
