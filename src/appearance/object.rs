@@ -2,6 +2,7 @@
 
 use super::padding::{AIR, is_padded};
 use super::quantile::quantiles;
+#[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::settings::transfer_function::Ramp;
 use crate::volume::ValueSlice;

@@ -7,6 +7,7 @@ use super::hounsfield::Hounsfield;
 use super::object::Object;
 use super::quantile::quantiles;
 use super::{categories, channel_display, constant, xray};
+#[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Compositing;

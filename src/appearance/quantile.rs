@@ -1,6 +1,7 @@
 //! Histograms, and exact quantiles without sorting.
 
 use crate::lists::iso_range::{of_ordinal, ordinal};
+#[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::volume::ValueSlice;
 

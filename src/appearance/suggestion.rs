@@ -5,6 +5,7 @@ use super::hounsfield::offset_of;
 use super::object::Object;
 use super::preset::Preset;
 use super::quantile::quantiles;
+#[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::volume::{ValueSlice, Volume};
 

@@ -2,7 +2,7 @@
 #![cfg_attr(not(feature = "cpu"), expect(dead_code, reason = "some are only used by the native backend"))]
 
 use std::convert::Infallible;
-use std::iter::{Enumerate, Filter, FilterMap, FlatMap, Map, StepBy, Zip};
+use std::iter::{Enumerate, Filter, FilterMap, FlatMap, Map, Zip};
 use std::ops::Range;
 use std::slice::{Chunks, ChunksMut, Iter, IterMut};
 
@@ -56,10 +56,6 @@ impl<I: Iterator> Loop<I> {
 
     pub(crate) fn zip<T: IntoIterator>(self, other: T) -> Loop<Zip<I, T::IntoIter>> {
         Loop(self.0.zip(other))
-    }
-
-    pub(crate) fn step_by(self, step: usize) -> Loop<StepBy<I>> {
-        Loop(self.0.step_by(step))
     }
 
     pub(crate) fn with_min_len(self, _: usize) -> Self {

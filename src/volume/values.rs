@@ -20,17 +20,21 @@ const EMPTY: [i32; 2] = [i32::MAX, i32::MIN];
 /// The values of a volume, x fastest, in memory of their own: whole numbers of 8 or 16 bits, or `f32`, whose NaN is a hole.
 ///
 /// A volume keeps them in the fewest bits that hold every one of them, whatever type they are given in, and everything that is drawn or told of them is what
-/// `f32` would give.
+/// `f32` would give. In WebAssembly, where code must be short, they are always `f32`.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub enum Values {
     /// Whole numbers from 0 to 255.
+    #[cfg(not(target_arch = "wasm32"))]
     U8(Vec<u8>),
     /// Whole numbers from -128 to 127.
+    #[cfg(not(target_arch = "wasm32"))]
     I8(Vec<i8>),
     /// Whole numbers from 0 to 65535.
+    #[cfg(not(target_arch = "wasm32"))]
     U16(Vec<u16>),
     /// Whole numbers from -32768 to 32767.
+    #[cfg(not(target_arch = "wasm32"))]
     I16(Vec<i16>),
     /// Any numbers.
     F32(Vec<f32>),
@@ -41,12 +45,16 @@ pub enum Values {
 #[non_exhaustive]
 pub enum ValueSlice<'a> {
     /// Whole numbers from 0 to 255.
+    #[cfg(not(target_arch = "wasm32"))]
     U8(&'a [u8]),
     /// Whole numbers from -128 to 127.
+    #[cfg(not(target_arch = "wasm32"))]
     I8(&'a [i8]),
     /// Whole numbers from 0 to 65535.
+    #[cfg(not(target_arch = "wasm32"))]
     U16(&'a [u16]),
     /// Whole numbers from -32768 to 32767.
+    #[cfg(not(target_arch = "wasm32"))]
     I16(&'a [i16]),
     /// Any numbers.
     F32(&'a [f32]),
@@ -58,9 +66,13 @@ pub struct ValueIter<'a>(Numbers<'a>);
 
 #[derive(Clone, Debug)]
 enum Numbers<'a> {
+    #[cfg(not(target_arch = "wasm32"))]
     U8(Iter<'a, u8>),
+    #[cfg(not(target_arch = "wasm32"))]
     I8(Iter<'a, i8>),
+    #[cfg(not(target_arch = "wasm32"))]
     U16(Iter<'a, u16>),
+    #[cfg(not(target_arch = "wasm32"))]
     I16(Iter<'a, i16>),
     F32(Iter<'a, f32>),
 }
@@ -70,9 +82,13 @@ enum Numbers<'a> {
 macro_rules! for_type {
     ($enum:ident, $of:expr, $name:ident => $result:expr) => {
         match $of {
+            #[cfg(not(target_arch = "wasm32"))]
             $enum::U8($name) => $result,
+            #[cfg(not(target_arch = "wasm32"))]
             $enum::I8($name) => $result,
+            #[cfg(not(target_arch = "wasm32"))]
             $enum::U16($name) => $result,
+            #[cfg(not(target_arch = "wasm32"))]
             $enum::I16($name) => $result,
             $enum::F32($name) => $result,
         }
@@ -115,24 +131,34 @@ macro_rules! kept {
         )*
     };
 }
-kept!(U8: u8, I8: i8, U16: u16, I16: i16, F32: f32);
+#[cfg(not(target_arch = "wasm32"))]
+kept!(U8: u8, I8: i8, U16: u16, I16: i16);
+kept!(F32: f32);
 
 /// A type of [`Values`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Form {
+    #[cfg(not(target_arch = "wasm32"))]
     U8,
+    #[cfg(not(target_arch = "wasm32"))]
     I8,
+    #[cfg(not(target_arch = "wasm32"))]
     U16,
+    #[cfg(not(target_arch = "wasm32"))]
     I16,
     F32,
 }
 
 impl Form {
     /// The forms of whole numbers, those of fewer bits first, and the numbers that each holds.
-    const WHOLE: [(Self, [i32; 2]); 4] = [
+    const WHOLE: &[(Self, [i32; 2])] = &[
+        #[cfg(not(target_arch = "wasm32"))]
         (Self::U8, [u8::MIN as i32, u8::MAX as i32]),
+        #[cfg(not(target_arch = "wasm32"))]
         (Self::I8, [i8::MIN as i32, i8::MAX as i32]),
+        #[cfg(not(target_arch = "wasm32"))]
         (Self::U16, [u16::MIN as i32, u16::MAX as i32]),
+        #[cfg(not(target_arch = "wasm32"))]
         (Self::I16, [i16::MIN as i32, i16::MAX as i32]),
     ];
 
@@ -149,7 +175,9 @@ impl Form {
 
     fn bytes(self) -> usize {
         match self {
+            #[cfg(not(target_arch = "wasm32"))]
             Self::U8 | Self::I8 => 1,
+            #[cfg(not(target_arch = "wasm32"))]
             Self::U16 | Self::I16 => 2,
             Self::F32 => 4,
         }
@@ -161,10 +189,19 @@ impl Form {
     }
 }
 
+/// No values.
+#[cfg(not(target_arch = "wasm32"))]
 impl Default for Values {
-    /// No values.
     fn default() -> Self {
         Self::U8(Vec::new())
+    }
+}
+
+/// No values.
+#[cfg(target_arch = "wasm32")]
+impl Default for Values {
+    fn default() -> Self {
+        Self::F32(Vec::new())
     }
 }
 
@@ -172,9 +209,13 @@ impl Values {
     /// All values.
     pub fn as_slice(&self) -> ValueSlice<'_> {
         match self {
+            #[cfg(not(target_arch = "wasm32"))]
             Self::U8(values) => ValueSlice::U8(values),
+            #[cfg(not(target_arch = "wasm32"))]
             Self::I8(values) => ValueSlice::I8(values),
+            #[cfg(not(target_arch = "wasm32"))]
             Self::U16(values) => ValueSlice::U16(values),
+            #[cfg(not(target_arch = "wasm32"))]
             Self::I16(values) => ValueSlice::I16(values),
             Self::F32(values) => ValueSlice::F32(values),
         }
@@ -192,9 +233,13 @@ impl Values {
 
     fn form(&self) -> Form {
         match self {
+            #[cfg(not(target_arch = "wasm32"))]
             Self::U8(_) => Form::U8,
+            #[cfg(not(target_arch = "wasm32"))]
             Self::I8(_) => Form::I8,
+            #[cfg(not(target_arch = "wasm32"))]
             Self::U16(_) => Form::U16,
+            #[cfg(not(target_arch = "wasm32"))]
             Self::I16(_) => Form::I16,
             Self::F32(_) => Form::F32,
         }
@@ -203,9 +248,13 @@ impl Values {
     /// The same values in another form, which holds them.
     fn converted(self, form: Form) -> Self {
         for_type!(Self, self, values => match form {
+            #[cfg(not(target_arch = "wasm32"))]
             Form::U8 => Self::U8(converted(values)),
+            #[cfg(not(target_arch = "wasm32"))]
             Form::I8 => Self::I8(converted(values)),
+            #[cfg(not(target_arch = "wasm32"))]
             Form::U16 => Self::U16(converted(values)),
+            #[cfg(not(target_arch = "wasm32"))]
             Form::I16 => Self::I16(converted(values)),
             Form::F32 => Self::F32(converted(values)),
         })
@@ -251,7 +300,6 @@ impl Values {
 
     /// Makes every value that is not finite NaN, and returns the number of these.
     pub(super) fn punch_holes(&mut self) -> u64 {
-        let Self::F32(values) = self else { return 0 };
         let punch = |value: &mut f32| {
             let is_hole = !value.is_finite();
             if is_hole {
@@ -259,7 +307,12 @@ impl Values {
             }
             u64::from(is_hole)
         };
-        values.par_iter_mut().map(punch).sum()
+        match self {
+            Self::F32(values) => values.par_iter_mut().map(punch).sum(),
+            // Whole numbers are finite.
+            #[cfg(not(target_arch = "wasm32"))]
+            _ => 0,
+        }
     }
 }
 
@@ -300,9 +353,13 @@ impl<'a> ValueSlice<'a> {
     /// The values, one after the other.
     pub fn iter(self) -> ValueIter<'a> {
         ValueIter(match self {
+            #[cfg(not(target_arch = "wasm32"))]
             Self::U8(values) => Numbers::U8(values.iter()),
+            #[cfg(not(target_arch = "wasm32"))]
             Self::I8(values) => Numbers::I8(values.iter()),
+            #[cfg(not(target_arch = "wasm32"))]
             Self::U16(values) => Numbers::U16(values.iter()),
+            #[cfg(not(target_arch = "wasm32"))]
             Self::I16(values) => Numbers::I16(values.iter()),
             Self::F32(values) => Numbers::F32(values.iter()),
         })
@@ -325,12 +382,14 @@ impl<'a> ValueSlice<'a> {
 
     /// [`Self::iter`] on every core.
     pub(crate) fn par_iter(self) -> Indexed<impl Fn(usize) -> f32 + Copy + Send + Sync + 'a> {
-        (0..self.len()).into_par_iter().map(move |index| self.at(index))
+        let at = move |index| self.at(index);
+        (0..self.len()).into_par_iter().map(at)
     }
 
     /// [`Self::chunks`] on every core.
     pub(crate) fn par_chunks(self, size: usize) -> Indexed<impl Fn(usize) -> Self + Copy + Send + Sync + 'a> {
-        (0..self.len().div_ceil(size)).into_par_iter().map(move |number| self.chunk(size, number))
+        let chunk = move |number| self.chunk(size, number);
+        (0..self.len().div_ceil(size)).into_par_iter().map(chunk)
     }
 
     fn chunk(self, size: usize, number: usize) -> Self {

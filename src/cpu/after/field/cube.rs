@@ -93,11 +93,6 @@ impl Field<'_> {
     /// N and `Σ (c - base)·g`, each as four numbers to be added. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn cube_sums<S: Simd>(&self, simd: S, cube: &Cube) -> [f32x4<S>; 2] {
-        for_type!(ValueSlice, self.coefficients, all => self.cube_sums_of(simd, cube, all))
-    }
-
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cube_sums_of<S: Simd, T: Sample>(&self, simd: S, cube: &Cube, all: &[T]) -> [f32x4<S>; 2] {
         let weights = Weights::new(simd, self, cube.rest);
         let [step_y, step_z] = self.steps();
         let first = cube.index;
@@ -105,7 +100,7 @@ impl Field<'_> {
         let (mut total, mut sum) = (zero, zero);
         for z in 0..SIDE {
             let weight = weights.at(simd, z);
-            let c = rows(simd, all, first + z * step_z, step_y) - self.base;
+            let c = rows(simd, self.coefficients, first + z * step_z, step_y) - self.base;
             total += weight;
             sum += weight * c;
         }
@@ -193,11 +188,6 @@ impl Field<'_> {
     /// `Σ (c - f)·g·δ / N`, given f.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn cube_moments<S: Simd>(&self, simd: S, cube: &Cube, number: f32) -> [f32; 3] {
-        for_type!(ValueSlice, self.coefficients, all => self.cube_moments_of(simd, (cube, number), all))
-    }
-
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cube_moments_of<S: Simd, T: Sample>(&self, simd: S, (cube, number): (&Cube, f32), all: &[T]) -> [f32; 3] {
         let weights = Weights::new(simd, self, cube.rest);
         let [step_y, step_z] = self.steps();
         let first = cube.index;
@@ -206,7 +196,7 @@ impl Field<'_> {
         for plane in 0..SIDE {
             let weight = weights.at(simd, plane);
             total += weight;
-            let c = rows(simd, all, first + plane * step_z, step_y) - self.base;
+            let c = rows(simd, self.coefficients, first + plane * step_z, step_y) - self.base;
             let weighted = weight * (c * self.scale - number);
             x += weighted * weights.offsets[0];
             y += weighted * weights.offsets[1];
@@ -232,15 +222,20 @@ fn gaussian<S: Simd>(simd: S, exponent: f32x8<S>) -> f32x8<S> {
 
 /// Four rows of four voxels, given the index of the first one and the step from row to row.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn rows<S: Simd, T: Sample>(simd: S, all: &[T], at: usize, step: usize) -> f32x16<S> {
+fn rows<S: Simd>(simd: S, all: ValueSlice<'_>, at: usize, step: usize) -> f32x16<S> {
+    f32x16::load_array(simd, for_type!(ValueSlice, all, all => side_by_side(all, at, step)))
+}
+
+/// Their numbers, side by side before they are converted, so that one instruction converts as many as there are lanes.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn side_by_side<T: Sample>(all: &[T], at: usize, step: usize) -> [f32; SIDE * SIDE] {
     let row = |at: usize| {
         let row = &all[at..at + SIDE];
         [row[0], row[1], row[2], row[3]]
     };
-    // Side by side before they are converted, so that one instruction converts as many as there are lanes.
     let [[a, b, c, d], [e, f, g, h]] = [row(at), row(at + step)];
     let [[i, j, k, l], [m, n, o, p]] = [row(at + 2 * step), row(at + 3 * step)];
-    f32x16::load_array(simd, [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p].map(T::to_f32))
+    [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p].map(T::to_f32)
 }
 
 /// Four sums of four of sixteen numbers each.
