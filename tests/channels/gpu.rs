@@ -185,7 +185,7 @@ fn a_channel_without_opacity_changes_nothing() {
         set_transfers(&mut scene, &[nothing, second.clone()]);
         for rasterizer in RASTERIZERS {
             let mut alone = by(rasterizer, &scene);
-            set_transfers(&mut alone, &[second.clone()]);
+            set_transfers(&mut alone, std::slice::from_ref(&second));
             let only = single(volume.channels().nth(1).unwrap());
             let [both, one] = [(volume.clone(), by(rasterizer, &scene)), (only, alone)]
                 .map(|(volume, scene)| gpu.render_volume(volume, &scene).unwrap().image);
