@@ -47,6 +47,7 @@ mod streamed;
 #[cfg(feature = "tiff")]
 mod tiff;
 mod unit;
+mod value_slice;
 mod values;
 mod voxel;
 #[cfg(feature = "vtk")]
@@ -92,8 +93,9 @@ pub use store::{Store, StoreFacts, StoreLevel, open_raw_store, open_store};
 pub(crate) use store::{raw_store, store, stores};
 pub use streamed::{StreamedChannel, StreamedLevel, StreamedVolume};
 pub(crate) use streamed::{check_grids, sample_of_channels};
-pub(crate) use values::for_type;
-pub use values::{ValueIter, ValueSlice, Values};
+pub(crate) use value_slice::for_type;
+pub use value_slice::{ValueIter, ValueSlice};
+pub use values::Values;
 
 use crate::error::setting::SettingError;
 pub use crate::error::volume::VolumeError;

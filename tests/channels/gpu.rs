@@ -171,7 +171,7 @@ fn neither_order_nor_empty_channels_matter() {
     }
 }
 
-/// Even if it is the first one, whose bricks then are none.
+/// A transparent channel leaves the image alone, also as the first of two, where it leaves the first list of bricks empty.
 #[test]
 fn a_channel_without_opacity_changes_nothing() {
     let gpu = gpu();

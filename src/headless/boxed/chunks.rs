@@ -114,7 +114,7 @@ impl<'a> Chunks<'a> {
         low.cmplt(end).all().then(|| VoxelBox { low: low.as_uvec3(), end: end.as_uvec3() })
     }
 
-    /// Reads a box of the channels of which something can be seen there; `None` if there are none.
+    /// Reads the voxels of a box, in every channel that may show something there; `None` if no channel may.
     ///
     /// # Errors
     /// If a store cannot be read, or holds a value that is no label.
