@@ -23,17 +23,14 @@ LOOK: dict[str, Any] = {
 }
 
 
-@pytest.fixture(scope="module")
-def ball(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
-    """A Zarr array of a ball, whose chunks of zeros are left out."""
-    z, y, x = np.ogrid[-1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j]
-    values = np.clip(300 * (0.8 - np.sqrt(x * x + y * y + z * z)), 0, 250).astype(np.uint8)
-    path = tmp_path_factory.mktemp("stores") / "ball.zarr"
+def write_store(path: pathlib.Path, values: np.ndarray) -> None:
+    """Writes a Zarr array of bytes `[…, z, y, x]` in chunks; those of zeros are left out."""
+    chunks = [1] * (values.ndim - 3) + [CHUNK] * 3
     path.mkdir()
     metadata = {
         "zarr_format": 2,
-        "shape": [SIDE] * 3,
-        "chunks": [CHUNK] * 3,
+        "shape": values.shape,
+        "chunks": chunks,
         "dtype": "|u1",
         "order": "C",
         "compressor": None,
@@ -41,10 +38,19 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
         "fill_value": 0,
     }
     (path / ".zarray").write_text(json.dumps(metadata))
-    for at in np.ndindex(*[SIDE // CHUNK] * 3):
-        chunk = values[tuple(slice(CHUNK * a, CHUNK * (a + 1)) for a in at)]
+    for at in np.ndindex(*[size // chunk for size, chunk in zip(values.shape, chunks)]):
+        chunk = values[tuple(slice(size * a, size * (a + 1)) for a, size in zip(at, chunks))]
         if chunk.any():
             (path / ".".join(map(str, at))).write_bytes(chunk.tobytes())
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
+    """A Zarr array of a ball, whose chunks of zeros are left out."""
+    z, y, x = np.ogrid[-1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j]
+    values = np.clip(300 * (0.8 - np.sqrt(x * x + y * y + z * z)), 0, 250).astype(np.uint8)
+    path = tmp_path_factory.mktemp("stores") / "ball.zarr"
+    write_store(path, values)
     return path
 
 
@@ -96,23 +102,9 @@ def test_an_index_spares_chunks(ball: pathlib.Path, tmp_path: pathlib.Path) -> N
 
 def test_channels_are_streamed(tmp_path: pathlib.Path) -> None:
     z, y, x = np.ogrid[-1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j]
-    values = [np.clip(300 * (0.6 - np.sqrt((x - at) ** 2 + y * y + z * z)), 0, 180).astype(np.uint8) for at in (-0.2, 0.3)]
+    ball = lambda at: np.clip(300 * (0.6 - np.sqrt((x - at) ** 2 + y * y + z * z)), 0, 180).astype(np.uint8)
     path = tmp_path / "two.zarr"
-    path.mkdir()
-    metadata = {
-        "zarr_format": 2,
-        "shape": [2] + [SIDE] * 3,
-        "chunks": [1] + [CHUNK] * 3,
-        "dtype": "|u1",
-        "order": "C",
-        "compressor": None,
-        "filters": None,
-        "fill_value": 0,
-    }
-    (path / ".zarray").write_text(json.dumps(metadata))
-    for channel, *at in np.ndindex(2, *[SIDE // CHUNK] * 3):
-        chunk = values[channel][tuple(slice(CHUNK * a, CHUNK * (a + 1)) for a in at)]
-        (path / ".".join(map(str, (channel, *at)))).write_bytes(chunk.tobytes())
+    write_store(path, np.stack([ball(-0.2), ball(0.3)]))
     opacity = [[0, 0], [60, 0], [200, 0.8]]
     look: dict[str, Any] = {key: LOOK[key] for key in ("image", "camera", "splatting")}
     channels = [{"transfer": {"color": [[0, color]], "opacity": opacity}} for color in ([1, 0, 0], [0, 1, 0])]

@@ -141,39 +141,12 @@ impl VolumeTexture {
     fn fold(device: &Device, queue: &Queue, values: ValueSlice<'_>, side: u32, written: &dyn Fn()) -> Self {
         let format = ValueFormat::of(values);
         let (texture, uploaded) = Self::new(device, "sheetsplat.values", format, folded(values.len() as u64, side));
-        let count = values.len();
-        let some = |range| values.slice(range).iter();
         match format {
-            ValueFormat::Offset8(least) => {
-                let append = |texels: &mut Vec<u8>, value: f32| texels.push((value - least) as u8);
-                fill(
-                    queue,
-                    &texture,
-                    count,
-                    |texels, range| some(range).for_each(|value| append(texels, value)),
-                    written,
-                );
-            }
+            ValueFormat::Offset8(least) => fill_values(queue, &texture, values, |value| (value - least) as u8, written),
             ValueFormat::Offset16(least) => {
-                let append = |texels: &mut Vec<u16>, value: f32| texels.push((value - least) as u16);
-                fill(
-                    queue,
-                    &texture,
-                    count,
-                    |texels, range| some(range).for_each(|value| append(texels, value)),
-                    written,
-                );
+                fill_values(queue, &texture, values, |value| (value - least) as u16, written);
             }
-            ValueFormat::Bits => {
-                let append = |texels: &mut Vec<u32>, value: f32| texels.push(value.to_bits());
-                fill(
-                    queue,
-                    &texture,
-                    count,
-                    |texels, range| some(range).for_each(|value| append(texels, value)),
-                    written,
-                );
-            }
+            ValueFormat::Bits => fill_values(queue, &texture, values, f32::to_bits, written),
         }
         uploaded
     }
@@ -319,6 +292,20 @@ fn fill<T: bytemuck::NoUninit>(
         }
         written();
     }
+}
+
+/// Writes a texel for each of some values.
+fn fill_values<T: bytemuck::NoUninit>(
+    queue: &Queue,
+    texture: &wgpu::Texture,
+    values: ValueSlice<'_>,
+    texel: impl Fn(f32) -> T,
+    written: &dyn Fn(),
+) {
+    let append = |texels: &mut Vec<T>, range: Range<usize>| {
+        values.slice(range).iter().for_each(|value| texels.push(texel(value)));
+    };
+    fill(queue, texture, values.len(), append, written);
 }
 
 /// Writes a texel for each of some numbers.

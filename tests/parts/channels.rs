@@ -13,6 +13,7 @@ use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
 use crate::common::store::MemoryStore;
 use crate::merging::headless;
+use crate::streamed::in_four;
 
 const BACKENDS: [Backend; 3] = [Backend::Reference, Backend::Gpu, Backend::Cpu];
 
@@ -196,13 +197,7 @@ fn parts_of_several_channels_merge() {
         let (_, streamed) = streamed(&volume);
         let mut view = headless.view(streamed.clone(), &scene).unwrap();
         let whole = headless.draw(&mut view).unwrap().image;
-        let mut parts = Vec::new();
-        for slabs in [-1000..-3, -3..1000] {
-            for (x, width) in [(0, 25), (25, 36)] {
-                let window = Window { slabs: slabs.clone(), region: Region { x, y: 0, width, height: 47 } };
-                parts.push(headless.draw_part(&mut view, &window).unwrap().0);
-            }
-        }
+        let parts = in_four(&headless, &mut view);
         // Every store counts for what a part belongs to.
         let mut fingerprints = vec![parts[0].identity.fingerprint.clone()];
         let another = |volume: &Volume| {

@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::Image;
-use sheetsplat::headless::Backend;
+use sheetsplat::headless::{Backend, Headless, HeadlessView};
+use sheetsplat::part::Part;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Region, Window};
 use sheetsplat::stats::StoreCounts;
@@ -114,6 +115,18 @@ fn boxes_that_show_nothing_are_not_read() {
     assert!(drawn.image.pixels.iter().all(|pixel| *pixel == drawn.image.pixels[0]));
 }
 
+/// The parts of two ranges of slabs and two regions, which make up an image of 61×47 pixels.
+pub(crate) fn in_four(headless: &Headless, view: &mut HeadlessView) -> Vec<Part> {
+    let mut parts = Vec::new();
+    for slabs in [-1000..-3, -3..1000] {
+        for (x, width) in [(0, 25), (25, 36)] {
+            let window = Window { slabs: slabs.clone(), region: Region { x, y: 0, width, height: 47 } };
+            parts.push(headless.draw_part(view, &window).unwrap().0);
+        }
+    }
+    parts
+}
+
 #[test]
 fn parts_of_boxes_merge() {
     let (volume, scene) = head(64, &["splatting.classification=after"]);
@@ -121,13 +134,7 @@ fn parts_of_boxes_merge() {
     let store = MemoryStore::new(&volume, UVec3::splat(12));
     let mut view = headless.view(streamed(&volume, store, 1 << 20), &scene).unwrap();
     let whole = headless.draw(&mut view).unwrap().image;
-    let mut parts = Vec::new();
-    for slabs in [-1000..-3, -3..1000] {
-        for (x, width) in [(0, 25), (25, 36)] {
-            let window = Window { slabs: slabs.clone(), region: Region { x, y: 0, width, height: 47 } };
-            parts.push(headless.draw_part(&mut view, &window).unwrap().0);
-        }
-    }
+    let parts = in_four(&headless, &mut view);
     assert_at_most(largest_difference(&Image::merge(parts).unwrap(), &whole), 1e-6, "parts");
 }
 

@@ -6,7 +6,7 @@ use glam::UVec3;
 
 use super::cells::{Cells, Work};
 use super::colors::{Colors, ColorsOf};
-use super::differences::Differences;
+use super::differences::{Differences, MAX_VOXELS};
 use super::extreme::is_choice;
 use super::field::Field;
 use super::slab_integral::Integrals;
@@ -45,9 +45,6 @@ pub(in crate::cpu) struct Coefficients {
     /// Whether the transfer function or the compositing have changed since.
     is_stale: bool,
 }
-
-/// The maximum number of voxels of a volume whose values are kept as `f32` beside their narrower form, which then take 64 MiB.
-const MAX_WIDE: usize = 1 << 24;
 
 /// The differences of a volume's values.
 #[derive(Clone, Debug)]
@@ -124,7 +121,7 @@ impl Coefficients {
     pub(in crate::cpu) fn prepare(&mut self, volume: &Volume, scene: &Scene) {
         let (is_first, values) = (!std::mem::replace(&mut self.has_drawn, true), volume.values());
         let is_narrow = !matches!(values, ValueSlice::F32(_));
-        if !is_first && is_narrow && self.exact.is_none() && self.wide.is_none() && values.len() <= MAX_WIDE {
+        if !is_first && is_narrow && self.exact.is_none() && self.wide.is_none() && values.len() as u64 <= MAX_VOXELS {
             self.wide = Some(values.iter().collect());
         }
         let is_kept = scene.shading.gradient == Gradient::Differences && Field::is_narrow(scene.splatting.radius);
