@@ -5,7 +5,7 @@ use glam::UVec3;
 use super::cull::Pixels;
 use super::frame::Frame;
 use super::material::Material;
-use super::project::{FlatSections, Lens, Place, Projection};
+use super::project::{Lens, Place, Projection};
 use super::shade::Unshaded;
 use super::splat::{LocalFootprint, Splat};
 use super::vector::LANES;
@@ -52,8 +52,7 @@ impl Batch<'_> {
 
     /// The sections of a voxel without perspective.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn flat(&self, flat: &FlatSections, lane: usize) -> AlongRay {
-        let (first_plane, end) = (flat.first_planes[lane], flat.ends[lane]);
+    pub(super) fn flat(&self, (first_plane, end): (f32, i32)) -> AlongRay {
         AlongRay { end, first_plane, step: self.flat_step, local: LocalFootprint::default() }
     }
 

@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 
 use super::cull::OpenMask;
 use super::cut::TileRays;
-use super::sheets::{ALL_VECTORS, Buffers, CHANNELS, COLUMNS, ROWS, Sheet};
+use super::sheets::{Buffers, CHANNELS, COLUMNS, ROWS, Sheet, VECTORS};
 use super::vector::{LANES, saturation};
 use crate::lists::quad_plan::TILE;
 use crate::settings::splatting::{Compositing, Order};
@@ -24,112 +24,94 @@ pub(super) struct Compositor {
     pub(super) first_hit: Option<f32>,
 }
 
-/// The position of a row of a sheet that begins at `begin`.
-struct SheetPlace<'a> {
-    rays: &'a TileRays,
-    row: usize,
-    begin: f32,
-    /// The bits of the vectors of columns that are composited.
-    vectors: u8,
-}
-
 impl Compositor {
-    /// Composites the sheet, which begins at `begin`, clears it, and closes the pixels that became opaque; the number of tiles as statistics
-    /// count them (SPEC §8) in which there was anything to composite.
+    /// Composites a sheet that begins at `begin`, empties it, and closes the pixels that became opaque; the number of tiles
+    /// as statistics count them (SPEC §8) in which there was anything to composite.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn composite<S: Simd>(
         &self,
         simd: S,
+        sheet: &mut impl Sheet,
         buffers: &mut Buffers,
         (rays, begin): (&TileRays, f32),
         open: &mut OpenMask,
     ) -> u64 {
-        let Buffers { sheet: Sheet { rows: sheet, written, vectors }, kept, acc, hits } = buffers;
-        let filled = std::mem::take(written);
+        let filled = sheet.rows();
         let mut rows = match self.compositing {
             // While no surface has been reached, the compositing buffer holds the previous sheet.
-            Compositing::Surface => filled | std::mem::replace(kept, filled),
+            Compositing::Surface => filled | std::mem::replace(&mut buffers.kept, filled),
             // Empty pixels count too.
             Compositing::Minimum => u64::MAX >> (u64::BITS as usize - ROWS),
             _ => filled,
         };
         let has_empty = matches!(self.compositing, Compositing::Surface | Compositing::Minimum);
         let tiles = tiles_of(rows & open.rows());
-        let mut has_closed = false;
+        let mut closed = 0;
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
-            let sheet = &mut sheet[row];
-            let hits = self.first_hit.and(hits.get_mut(row));
-            let filled_vectors = std::mem::take(&mut vectors[row]);
-            let vectors = if has_empty { ALL_VECTORS } else { filled_vectors };
-            let place = SheetPlace { rays, row, begin, vectors };
-            let opaque = self.row(simd, &mut acc[row], sheet, place, hits) & open.row(row);
-            if filled >> row & 1 == 1 {
-                *sheet = [[0.0; COLUMNS]; CHANNELS];
+            let mut opaque = 0;
+            for vector in 0..VECTORS {
+                let pixels = match sheet.take(simd, row, vector) {
+                    Some(pixels) => pixels,
+                    None if has_empty => [f32x8::splat(simd, 0.0); CHANNELS],
+                    None => continue,
+                };
+                opaque |= self.vector(simd, pixels, buffers, (rays, begin), [row, vector * LANES]);
             }
-            if opaque != 0 {
-                open.close(row, opaque);
-                has_closed = true;
-            }
+            // Without a branch, which would wait for the row's colours.
+            closed |= opaque & open.row(row);
+            open.close(row, opaque);
         }
-        if has_closed {
+        if closed != 0 {
             open.join();
         }
         tiles
     }
 
-    /// Composites a row. Returns the bits of its opaque pixels, or 0 if nothing is culled.
+    /// Composites eight pixels of a row, from a column on. Returns the bits of its opaque ones among the row's, or 0 if nothing is culled.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn row<S: Simd>(
+    fn vector<S: Simd>(
         &self,
         simd: S,
-        acc: &mut [[f32; COLUMNS]; CHANNELS],
-        sheet: &[[f32; COLUMNS]; CHANNELS],
-        SheetPlace { rays, row, begin, vectors }: SheetPlace<'_>,
-        mut hits: Option<&mut [f32; COLUMNS]>,
+        mut pixels: Pixels<S>,
+        buffers: &mut Buffers,
+        (rays, begin): (&TileRays, f32),
+        [row, at]: [usize; 2],
     ) -> u32 {
         let splat = |number: f32| f32x8::splat(simd, number);
-        let mut opaque = 0;
-        for at in (0..COLUMNS).step_by(LANES) {
-            if vectors >> (at / LANES) & 1 == 0 {
-                continue;
-            }
-            let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[at..at + LANES]);
-            let mut pixels = load_pixels(simd, sheet, at);
-            let mut stretch = [splat(f32::NEG_INFINITY), splat(f32::INFINITY)];
-            let mut closed = 0;
-            if let Some(shown) = &rays.shown {
-                stretch = [load(&shown[row][0]), load(&shown[row][1])];
-                closed = stretch[1].simd_le(splat(begin + 1.0)).to_bitmask() as u32;
-                if self.compositing != Compositing::Minimum {
-                    let [start, end] = within_slab(simd, stretch, begin);
-                    pixels = scaled(pixels, (end - start).max(splat(0.0)));
-                }
-            }
-            if let Some(weights) = &rays.weights {
-                pixels = scaled(pixels, load(&weights[row]));
-            }
-            let before = load_pixels(simd, acc, at);
-            let mut after = self.pixels(simd, before, pixels);
-            if let Some(counted) = &rays.counted {
-                let middle = splat(begin + 0.5);
-                let counts = load(&counted[row][0]).simd_le(middle) & middle.simd_le(load(&counted[row][1]));
-                after = std::array::from_fn(|channel| counts.select(after[channel], before[channel]));
-            }
-            for (channel, after) in acc.iter_mut().zip(after) {
-                after.store_slice(&mut channel[at..at + LANES]);
-            }
-            if let Some(hits) = hits.as_deref_mut() {
-                let opacities = [before[3], pixels[3], after[3]];
-                let hit = self.hit(simd, load(hits), opacities, stretch, begin);
-                hit.store_slice(&mut hits[at..at + LANES]);
-            }
-            if let Some(threshold) = self.threshold {
-                opaque |= (after[3].simd_ge(splat(threshold)).to_bitmask() as u32 | closed) << at;
+        let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[at..at + LANES]);
+        let mut stretch = [splat(f32::NEG_INFINITY), splat(f32::INFINITY)];
+        let mut closed = 0;
+        if let Some(shown) = &rays.shown {
+            stretch = [load(&shown[row][0]), load(&shown[row][1])];
+            closed = stretch[1].simd_le(splat(begin + 1.0)).to_bitmask() as u32;
+            if self.compositing != Compositing::Minimum {
+                let [start, end] = within_slab(simd, stretch, begin);
+                pixels = scaled(pixels, (end - start).max(splat(0.0)));
             }
         }
-        opaque
+        if let Some(weights) = &rays.weights {
+            pixels = scaled(pixels, load(&weights[row]));
+        }
+        let acc = &mut buffers.acc[row];
+        let before = acc.each_ref().map(load);
+        let mut after = self.pixels(simd, before, pixels);
+        if let Some(counted) = &rays.counted {
+            let middle = splat(begin + 0.5);
+            let counts = load(&counted[row][0]).simd_le(middle) & middle.simd_le(load(&counted[row][1]));
+            after = std::array::from_fn(|channel| counts.select(after[channel], before[channel]));
+        }
+        for (channel, after) in acc.iter_mut().zip(after) {
+            after.store_slice(&mut channel[at..at + LANES]);
+        }
+        if self.first_hit.is_some() {
+            let hits = &mut buffers.hits[row];
+            let opacities = [before[3], pixels[3], after[3]];
+            let hit = self.hit(simd, load(hits), opacities, stretch, begin);
+            hit.store_slice(&mut hits[at..at + LANES]);
+        }
+        self.threshold.map_or(0, |threshold| (after[3].simd_ge(splat(threshold)).to_bitmask() as u32 | closed) << at)
     }
 
     /// Composites eight pixels. By means ([`Compositing`]): for the minimum the compositing buffer keeps 2 less the opacity, and 0 where
@@ -216,13 +198,6 @@ fn within_slab<S: Simd>(simd: S, [start, end]: [f32x8<S>; 2], begin: f32) -> [f3
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn crossing<S: Simd>(before: f32x8<S>, mean: f32x8<S>) -> f32x8<S> {
     (0.5 - before) / (mean - before)
-}
-
-#[cfg_attr(not(debug_assertions), inline(always))]
-fn load_pixels<S: Simd>(simd: S, row: &[[f32; COLUMNS]; CHANNELS], at: usize) -> Pixels<S> {
-    let [red, green, blue, alpha] = row;
-    let load = |channel: &[f32; COLUMNS]| f32x8::from_slice(simd, &channel[at..at + LANES]);
-    [load(red), load(green), load(blue), load(alpha)]
 }
 
 #[cfg_attr(not(debug_assertions), inline(always))]

@@ -42,7 +42,7 @@ impl Pixels {
     }
 }
 
-/// The pixels of a tile within eight boxes of one size: first and last column and row, the first after the last where there are none.
+/// The pixels of a tile within eight boxes: first and last column and row, the first after the last where there are none.
 pub(super) struct Boxes {
     columns: [[i32; LANES]; 2],
     rows: [[i32; LANES]; 2],
@@ -51,18 +51,18 @@ pub(super) struct Boxes {
 impl Boxes {
     /// As [`Pixels::within`].
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn within<S: Simd>(simd: S, centers: &[[f32; LANES]; 2], half: [f32; 2]) -> Self {
+    pub(super) fn within<S: Simd>(simd: S, centers: &[[f32; LANES]; 2], half: &[[f32; LANES]; 2]) -> Self {
         let [columns, rows] = [COLUMNS as f32, ROWS as f32];
         Self {
-            columns: Self::of_axis(simd, &centers[0], half[0], columns),
-            rows: Self::of_axis(simd, &centers[1], half[1], rows),
+            columns: Self::of_axis(simd, &centers[0], &half[0], columns),
+            rows: Self::of_axis(simd, &centers[1], &half[1], rows),
         }
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn of_axis<S: Simd>(simd: S, centers: &[f32; LANES], half: f32, count: f32) -> [[i32; LANES]; 2] {
+    fn of_axis<S: Simd>(simd: S, centers: &[f32; LANES], half: &[f32; LANES], count: f32) -> [[i32; LANES]; 2] {
         let splat = |number: f32| f32x8::splat(simd, number);
-        let centers = f32x8::load_array_ref(simd, centers);
+        let [centers, half] = [centers, half].map(|lanes| f32x8::load_array_ref(simd, lanes));
         let first = (centers - half).max(splat(0.0)).min(splat(count)).ceil();
         let last = (centers + half).max(splat(-1.0)).min(splat(count - 1.0)).floor();
         [first.to_int::<i32x8<S>>().to_array(), last.to_int::<i32x8<S>>().to_array()]

@@ -1,7 +1,7 @@
 //! The native backend: the renderer of SPEC §§2–8 on all cores, without a GPU or a driver.
 //!
 //! ```text
-//! bricks ─ bin ─→ every tile of 32×32 pixels, its sheets front to back in a ring of eight:
+//! bricks ─ bin ─→ every tile of 32×64 pixels, its sheets front to back in a ring of six:
 //!                   cull       bricks, then voxels, that opaque pixels hide
 //!                   shade      eight visible voxels at a time, from materials that bricks keep from frame to frame
 //!                   splat      the pixels that a voxel reaches, all of its sections at a time
@@ -13,7 +13,7 @@
 //! Where classification comes after splatting, `after` walks the tiles.
 //!
 //! Functions that work with vectors are inlined into the function that an instruction set is chosen for, or choose it themselves; else their vectors would pass
-//! through memory. Builds without optimization are the exception, since there one function with everything inlined would need megabytes of stack.
+//! through memory. So closures with vectors must be small, and arrays of vectors are written out: `map` of an array of them is a call. Builds without optimization are the exception, since there one function with everything inlined would need megabytes of stack.
 //!
 //! Stages are those of the GPU, by the same names. The same scene gives the same bytes on every machine (SPEC §12): pixels are `f32` by IEEE
 //! `+ - × ÷ √`, never contracted, and every pixel's sums are taken in one order, whatever the number of threads and the vectors' width.

@@ -6,7 +6,6 @@ use std::ops::Range;
 use glam::{DVec2, DVec3, UVec3};
 
 use super::queue::{BySlot, NO_SHEET};
-use super::vector::LANES;
 use crate::geometry::slab;
 use crate::geometry::view_geometry::{Perspective, ViewGeometry};
 use crate::lists::brick::Brick;
@@ -59,14 +58,6 @@ pub(super) struct Local {
     pub(super) cut: f64,
 }
 
-/// The sections that eight voxels without perspective have from a sheet on.
-pub(super) struct FlatSections {
-    /// The distances from the voxels to the plane where they begin, grid units along their rays.
-    pub(super) first_planes: [f32; LANES],
-    /// The ends of the voxels' ranges of sheets.
-    pub(super) ends: [i32; LANES],
-}
-
 /// Where the voxels of a brick are, from its first place, by slot.
 #[derive(Clone, Debug)]
 struct Offsets {
@@ -88,6 +79,8 @@ pub(super) struct Projection {
     /// up in the same order: the least difference would decide between equal sheets.
     least: i32,
     offsets: Offsets,
+    /// The least and the largest of their depths.
+    depths: [f64; 2],
     /// How kernels are seen without perspective: all of them alike.
     pub(super) flat: Lens,
 }
@@ -103,11 +96,15 @@ impl Projection {
             depth: std::array::from_fn(|slot| offset(slot).depth),
             from_eye: std::array::from_fn(|slot| offset(slot).from_eye),
         };
+        let depths = offsets
+            .depth
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], &depth| [low.min(depth), high.max(depth)]);
         let per_slab = whole_kernel(&view);
         let flat = Lens { per_slab, per_lambda: 1.0 / view.lambda, to_eye: -view.basis.w, local: None };
         let window = sheets_of(direction, slabs);
         let span = (2.0 * view.reach / view.slabs.width).ceil() as i32 + 1;
-        Self { direction, least: window.start - span, window, offsets, flat, view }
+        Self { direction, least: window.start - span, window, offsets, depths, flat, view }
     }
 
     /// Where a brick's first place is.
@@ -124,48 +121,33 @@ impl Projection {
         brick.plus(Place { x: x[slot], y: y[slot], depth: depth[slot], from_eye: from_eye[slot] })
     }
 
-    /// Pixel coordinates of a brick's voxels in eight slots, from the first on, in a tile given by its first pixel. The centre of that is at 0, 0.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn centers(&self, brick: Place, first: usize, origin: [usize; 2]) -> [[f32; LANES]; 2] {
-        let [width, height] = self.view.size.map(f64::from);
-        let (shift_x, shift_y) = (width / 2.0 - 0.5 - origin[0] as f64, height / 2.0 - 0.5 - origin[1] as f64);
-        let slots = first..first + LANES;
-        let (x, y) = (&self.offsets.x[slots.clone()], &self.offsets.y[slots.clone()]);
-        let mut centers = [[0.0; LANES]; 2];
-        let [columns, rows] = &mut centers;
-        if self.view.perspective.is_none() {
-            for ((column, row), (x, y)) in columns.iter_mut().zip(rows).zip(x.iter().zip(y)) {
-                *column = (brick.x + x + shift_x) as f32;
-                *row = (brick.y + y + shift_y) as f32;
-            }
-        } else {
-            let places = x.iter().zip(y).zip(&self.offsets.from_eye[slots]);
-            for ((column, row), ((x, y), from_eye)) in columns.iter_mut().zip(rows).zip(places) {
-                let from_eye = brick.from_eye + from_eye;
-                *column = ((brick.x + x) / from_eye + shift_x) as f32;
-                *row = ((brick.y + y) / from_eye + shift_y) as f32;
-            }
-        }
-        centers
+    /// What is added to the pixel coordinates of places from the image's middle, in a tile given by its first pixel, whose centre is at 0, 0.
+    pub(super) fn shift(&self, origin: [usize; 2]) -> [f64; 2] {
+        std::array::from_fn(|axis| f64::from(self.view.size[axis]) / 2.0 - 0.5 - origin[axis] as f64)
     }
 
-    /// What sections a brick's voxels in eight slots, from the first on, have from a sheet on; `None` in perspective, where every voxel has a lens
-    /// of its own.
+    /// The pixel coordinates of one of a brick's voxels, shifted.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn flat_sections(&self, brick: Place, first: usize, sheet: i32) -> Option<FlatSections> {
-        if self.view.perspective.is_some() {
-            return None;
+    pub(super) fn center(&self, brick: Place, slot: u32, shift: [f64; 2]) -> [f32; 2] {
+        let slot = slot as usize % BRICK_VOXELS as usize;
+        let (x, y) = (brick.x + self.offsets.x[slot], brick.y + self.offsets.y[slot]);
+        match self.view.perspective {
+            None => [(x + shift[0]) as f32, (y + shift[1]) as f32],
+            Some(_) => {
+                let from_eye = brick.from_eye + self.offsets.from_eye[slot];
+                [(x / from_eye + shift[0]) as f32, (y / from_eye + shift[1]) as f32]
+            }
         }
-        let plane = self.plane_before(sheet);
+    }
+
+    /// The sections that a voxel without perspective has from a sheet on: the distance from the voxel to the plane where they begin, grid units along
+    /// its ray, and the end of its range of sheets.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn flat_sections(&self, brick: Place, slot: u32, sheet: i32) -> (f32, i32) {
+        let depth = brick.depth + self.offsets.depth[slot as usize % BRICK_VOXELS as usize];
         let reach = self.view.reach / self.view.slabs.width;
-        let mut sections = FlatSections { first_planes: [0.0; LANES], ends: [0; LANES] };
-        let FlatSections { first_planes, ends } = &mut sections;
-        for ((first_plane, end), offset) in first_planes.iter_mut().zip(ends).zip(&self.offsets.depth[first..]) {
-            let depth = brick.depth + offset;
-            *first_plane = ((plane - depth) * self.flat.per_slab) as f32;
-            *end = self.numbered(depth - reach, depth + reach).end;
-        }
-        Some(sections)
+        let first_plane = ((self.plane_before(sheet) - depth) * self.flat.per_slab) as f32;
+        (first_plane, self.numbered(depth - reach, depth + reach).end)
     }
 
     /// The plane at which a sheet begins, in the order of compositing.
@@ -201,6 +183,18 @@ impl Projection {
         let mut first = [NO_SHEET; BRICK_VOXELS as usize];
         if self.view.perspective.is_none() {
             let reach = self.view.reach / self.view.slabs.width;
+            let [lowest, highest] = self.depths.map(|offset| place.depth + offset);
+            if self.is_uncut(&self.unclipped(lowest - reach, highest + reach)) {
+                // The ends of all ranges lie behind their starts.
+                for (first, offset) in first.iter_mut().zip(&self.offsets.depth) {
+                    let depth = place.depth + offset;
+                    *first = match self.direction > 0 {
+                        true => floor(depth - reach + slab::ROUNDING),
+                        false => 1 + floor(-(depth + reach - slab::ROUNDING)),
+                    };
+                }
+                return first;
+            }
             for (first, offset) in first.iter_mut().zip(&self.offsets.depth) {
                 let depth = place.depth + offset;
                 let sheets = self.numbered(depth - reach, depth + reach);
@@ -221,9 +215,20 @@ impl Projection {
     /// before the first.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn numbered(&self, first: f64, end: f64) -> Range<i32> {
+        let Range { start, end } = self.unclipped(first, end);
+        self.reaching(start, end)
+    }
+
+    /// The same of all sheets.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn unclipped(&self, first: f64, end: f64) -> Range<i32> {
         let (first, end) = (floor(first + slab::ROUNDING), -floor(-(end - slab::ROUNDING)));
-        let (first, end) = if self.direction > 0 { (first, end) } else { (1 - end, 1 - first) };
-        self.reaching(first, end)
+        if self.direction > 0 { first..end } else { 1 - end..1 - first }
+    }
+
+    /// Whether all of some sheets are composited, so that none of their parts is clipped.
+    fn is_uncut(&self, sheets: &Range<i32>) -> bool {
+        sheets.start >= self.window.start && sheets.end <= self.window.end && sheets.start >= self.least
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]

@@ -81,10 +81,9 @@ impl Shader {
             true => optical_depth(simd, alpha.min(f32x8::splat(simd, 0.9999))),
             false => alpha,
         } * load(&voxels.scale);
-        let [color, normal, to_eye] = [&voxels.color, &voxels.normal, &voxels.to_eye].map(|of| of.each_ref().map(load));
-        let color = self.color(simd, color, normal, to_eye);
-        let [red, green, blue] = color.map(|channel| (channel * amount).to_array());
-        [red, green, blue, amount.to_array()]
+        let of = |[x, y, z]: &[[f32; LANES]; 3]| [load(x), load(y), load(z)];
+        let [red, green, blue] = self.color(simd, of(&voxels.color), of(&voxels.normal), of(&voxels.to_eye));
+        [(red * amount).to_array(), (green * amount).to_array(), (blue * amount).to_array(), amount.to_array()]
     }
 
     /// The colours in this light. A normal of 0 stands for a voxel without a direction, which gets ambient light alone.
@@ -100,23 +99,27 @@ impl Shader {
             return color;
         }
         let (diffuse, highlight) = self.lighting(simd, normal, to_eye);
-        color.map(|channel| {
-            let lit = channel * (diffuse + self.ambient) + highlight;
-            lit.max(f32x8::splat(simd, 0.0)).min(f32x8::splat(simd, 1.0))
-        })
+        let (factor, zero, one) = (diffuse + self.ambient, f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let lit = |channel: f32x8<S>| (channel * factor + highlight).max(zero).min(one);
+        let [red, green, blue] = color;
+        [lit(red), lit(green), lit(blue)]
     }
 
     /// The diffuse and the specular term: two-sided, and 0 without a normal.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn lighting<S: Simd>(&self, simd: S, normal: [f32x8<S>; 3], to_eye: [f32x8<S>; 3]) -> (f32x8<S>, f32x8<S>) {
-        let to_light = self.to_light.map_or(to_eye, |light| light.map(|component| f32x8::splat(simd, component)));
+        let splat = |component: f32| f32x8::splat(simd, component);
+        let to_light = match self.to_light {
+            None => to_eye,
+            Some([x, y, z]) => [splat(x), splat(y), splat(z)],
+        };
         let dot = |a: [f32x8<S>; 3], b: [f32x8<S>; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-        let half = [0, 1, 2].map(|axis| to_light[axis] + to_eye[axis]);
+        let half = [to_light[0] + to_eye[0], to_light[1] + to_eye[1], to_light[2] + to_eye[2]];
         let squared = dot(half, half);
         // Light from straight behind has no half vector.
-        let has_half = squared.simd_gt(f32x8::splat(simd, 1e-12));
-        let zero = f32x8::splat(simd, 0.0);
-        let length = has_half.select(squared, f32x8::splat(simd, 1.0)).sqrt();
+        let has_half = squared.simd_gt(splat(1e-12));
+        let zero = splat(0.0);
+        let length = has_half.select(squared, splat(1.0)).sqrt();
         let cosine = has_half.select(dot(normal, half).abs() / length, zero);
         let diffuse = dot(normal, to_light).abs() * self.diffuse;
         let highlight = if self.specular > 0.0 { power(simd, cosine, self.shininess) * self.specular } else { zero };

@@ -1,6 +1,9 @@
-//! A tile's buffers: the ring of open sheets that voxels are splatted into, the sheet that is composited next, and the compositing buffer.
+//! A tile's buffers: the ring of open sheets that voxels are splatted into, and the compositing buffer.
 
-use super::vector::LANES;
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x4, f32x8};
+
+use super::vector::{LANES, columns};
 
 /// Pixels along a row of a tile.
 pub(super) const COLUMNS: usize = 32;
@@ -13,14 +16,21 @@ pub(super) const SECTIONS: usize = RING - 1;
 /// Red, green, blue, opacity.
 pub(super) const CHANNELS: usize = 4;
 
-/// The columns that share a bit of [`Ring::written`].
-const BLOCK: usize = COLUMNS / u8::BITS as usize;
+/// The vectors of a row's columns.
+pub(super) const VECTORS: usize = COLUMNS / LANES;
 
-/// The bytes of a ring's slots.
-const RING_BYTES: u64 = u64::MAX >> (u64::BITS as usize - 8 * RING);
+/// All vectors of a row, as bits.
+const ALL_VECTORS: u32 = u32::MAX >> (u32::BITS as usize - VECTORS);
 
-/// All vectors of a row.
-pub(super) const ALL_VECTORS: u8 = u8::MAX >> (u8::BITS as usize - COLUMNS / LANES);
+/// A bit for each of a ring's slots, the first of its bits in [`Ring::written`].
+const SLOTS: u32 = {
+    let (mut slots, mut slot) = (0, 0);
+    while slot < RING {
+        slots |= 1 << (VECTORS * slot);
+        slot += 1;
+    }
+    slots
+};
 
 /// Vectors of a pixel's sums: each holds all channels of two slots, the second of which is [`HALF_RING`] after the first.
 pub(super) const HALF_RING: usize = RING / 2;
@@ -41,25 +51,35 @@ const NO_SUMS: PixelSums = [Sums([0.0; 2 * CHANNELS]); HALF_RING];
 pub(super) struct Ring {
     /// The sums of pixels, row by row.
     pub(super) pixels: Vec<PixelSums>,
-    /// Which columns of a row are not empty: byte s has a bit for every 4 columns of slot s.
-    written: [u64; ROWS],
+    /// Which vectors of a row's columns are not empty: those of the first slot in the lowest bits, and so on.
+    written: [u32; ROWS],
 }
 
-/// One sheet, row by row.
-#[derive(Debug)]
-pub(super) struct Sheet {
-    pub(super) rows: Vec<[[f32; COLUMNS]; CHANNELS]>,
+/// A sheet that is composited.
+pub(super) trait Sheet {
     /// The bits of the rows that are not empty.
-    pub(super) written: u64,
-    /// For every row the bits of its vectors of columns that are not empty.
-    pub(super) vectors: [u8; ROWS],
+    fn rows(&self) -> u64;
+
+    /// The sums of a vector of a row's pixels, by channel, which the sheet no longer holds then; `None` if nothing was added to them.
+    fn take<S: Simd>(&mut self, simd: S, row: usize, vector: usize) -> Option<[f32x8<S>; CHANNELS]>;
+
+    /// Empties it.
+    fn clear<S: Simd>(&mut self, simd: S) {
+        for (row, vector) in (0..ROWS).flat_map(|row| (0..VECTORS).map(move |vector| (row, vector))) {
+            self.take(simd, row, vector);
+        }
+    }
+}
+
+/// One of the open sheets.
+pub(super) struct OpenSheet<'a> {
+    ring: &'a mut Ring,
+    slot: usize,
 }
 
 /// The buffers of one tile from which its image is made.
 #[derive(Debug)]
 pub(super) struct Buffers {
-    /// The sheet that is composited next.
-    pub(super) sheet: Sheet,
     /// The rows whose compositing buffer may hold a surface that is not reached yet.
     pub(super) kept: u64,
     /// The compositing buffer, row by row.
@@ -77,14 +97,13 @@ impl Ring {
     /// Records that pixels within a box were written to in some slots, from one on.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn mark(&mut self, columns: [usize; 2], rows: [usize; 2], slot: usize, count: usize) {
-        let [first, last] = columns.map(|column| column / BLOCK);
-        let blocks = u64::from(u8::MAX) >> (u8::BITS as usize - 1 - last) & u64::MAX << first;
-        // The byte 1 for each of the slots, those beyond the last one round to the first.
-        let ones = u64::MAX / u64::from(u8::MAX);
-        let slots = ones & !(u64::MAX << (8 * count));
-        let slots = slots << (8 * slot) & RING_BYTES | slots >> (8 * (RING - slot));
+        let [first, last] = columns.map(|column| column / LANES);
+        let vectors = ALL_VECTORS >> (VECTORS - 1 - last) & u32::MAX << first;
+        // Those beyond the last one round to the first.
+        let slots = SLOTS & !(u32::MAX << (VECTORS * count));
+        let slots = (slots << (VECTORS * slot) | slots >> (VECTORS * (RING - slot))) & SLOTS;
         for row in &mut self.written[rows[0]..=rows[1]] {
-            *row |= slots * blocks;
+            *row |= slots * vectors;
         }
     }
 
@@ -92,35 +111,9 @@ impl Ring {
         self.written == [0; ROWS]
     }
 
-    /// Moves the sheet of a slot into an empty one.
-    pub(super) fn take(&mut self, slot: usize, sheet: &mut Sheet) {
-        for (row, written) in self.written.iter_mut().enumerate() {
-            let mut blocks = (*written >> (8 * slot)) as u8;
-            if blocks == 0 {
-                continue;
-            }
-            *written &= !(u64::from(u8::MAX) << (8 * slot));
-            // A bit of `blocks` is half a vector.
-            for vector in 0..COLUMNS / LANES {
-                if blocks >> (2 * vector) & 0b11 != 0 {
-                    sheet.mark(row, vector * LANES);
-                }
-            }
-            let target = &mut sheet.rows[row];
-            while blocks != 0 {
-                let column = blocks.trailing_zeros() as usize * BLOCK;
-                blocks &= blocks - 1;
-                let pixels = &mut self.pixels[row * COLUMNS + column..];
-                for (column, sums) in (column..column + BLOCK).zip(pixels) {
-                    let Sums(sums) = &mut sums[slot % HALF_RING];
-                    let sums = &mut sums[slot / HALF_RING * CHANNELS..][..CHANNELS];
-                    for (target, sum) in target.iter_mut().zip(&*sums) {
-                        target[column] = *sum;
-                    }
-                    sums.fill(0.0);
-                }
-            }
-        }
+    /// A sheet of those that are open.
+    pub(super) fn sheet(&mut self, sheet: i32) -> OpenSheet<'_> {
+        OpenSheet { slot: slot_of(sheet), ring: self }
     }
 
     /// Makes all sheets empty, for the next tile.
@@ -133,39 +126,38 @@ impl Ring {
     }
 }
 
-impl Sheet {
-    /// An empty one.
-    pub(super) fn new() -> Self {
-        Self { rows: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS], written: 0, vectors: [0; ROWS] }
+impl Sheet for OpenSheet<'_> {
+    fn rows(&self) -> u64 {
+        let is_filled = |written: &u32| written >> (VECTORS * self.slot) & ALL_VECTORS != 0;
+        self.ring.written.iter().rev().fold(0, |rows, written| rows << 1 | u64::from(is_filled(written)))
     }
 
-    /// Makes it empty.
-    pub(super) fn clear(&mut self) {
-        for row in (0..ROWS).filter(|row| self.written >> row & 1 == 1) {
-            self.rows[row] = [[0.0; COLUMNS]; CHANNELS];
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn take<S: Simd>(&mut self, simd: S, row: usize, vector: usize) -> Option<[f32x8<S>; CHANNELS]> {
+        let bit = 1 << (VECTORS * self.slot + vector);
+        if self.ring.written[row] & bit == 0 {
+            return None;
         }
-        (self.written, self.vectors) = (0, [0; ROWS]);
-    }
-
-    /// Records that pixels from a column on, a vector of them, were written to.
-    pub(super) fn mark(&mut self, row: usize, column: usize) {
-        self.written |= 1 << row;
-        self.vectors[row] |= 1 << (column / LANES);
+        self.ring.written[row] &= !bit;
+        let (pair, first) = (self.slot % HALF_RING, self.slot / HALF_RING * CHANNELS);
+        let pixels = &mut self.ring.pixels[row * COLUMNS + vector * LANES..][..LANES];
+        let mut taken = [[0.0; CHANNELS]; LANES];
+        for (taken, pixel) in taken.iter_mut().zip(pixels) {
+            let sums = &mut pixel[pair].0[first..first + CHANNELS];
+            f32x4::from_slice(simd, sums).store_slice(taken);
+            sums.fill(0.0);
+        }
+        Some(columns(simd, taken.each_ref()))
     }
 }
 
 impl Buffers {
     /// Buffers of zeros.
     pub(super) fn new() -> Self {
-        Self {
-            sheet: Sheet::new(),
-            kept: 0,
-            acc: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS],
-            hits: vec![[f32::INFINITY; COLUMNS]; ROWS],
-        }
+        Self { kept: 0, acc: vec![[[0.0; COLUMNS]; CHANNELS]; ROWS], hits: vec![[f32::INFINITY; COLUMNS]; ROWS] }
     }
 
-    /// Clears the buffers for the next tile. A composited sheet is already empty.
+    /// Clears the buffers for the next tile.
     pub(super) fn clear(&mut self) {
         self.kept = 0;
         self.acc.fill([[0.0; COLUMNS]; CHANNELS]);

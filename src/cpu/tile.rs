@@ -16,12 +16,12 @@ use super::frame::{Frame, Voxels};
 use super::project::Place;
 use super::queue::{Queue, Waiting};
 use super::reached::Reached;
-use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
+use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, Sheet, slot_of};
 use super::splat::Splat;
 use super::stream::{Approach, Chunk, Stream};
 use super::vector::LANES;
 use crate::lists::brick;
-use crate::lists::brick::{BRICK_VOXELS, Brick};
+use crate::lists::brick::Brick;
 use fearless_simd::prelude::*;
 
 /// A brick that has arrived.
@@ -36,6 +36,31 @@ struct Arrived {
     half_box: [f32; 2],
     /// The sheet behind its last one.
     end: i32,
+}
+
+/// Up to eight voxels that begin in a sheet.
+#[derive(Default)]
+struct Starts {
+    count: usize,
+    /// Their bricks' indices among those that have arrived, and their slots.
+    voxels: [[u32; 2]; LANES],
+    /// Pixel coordinates.
+    centers: [[f32; LANES]; 2],
+    /// Half the sizes of boxes that contain their footprints.
+    half_boxes: [[f32; LANES]; 2],
+}
+
+impl Starts {
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn add(&mut self, voxel: [u32; 2], center: [f32; 2], half_box: [f32; 2]) {
+        let lane = self.count;
+        self.voxels[lane] = voxel;
+        for axis in 0..2 {
+            self.centers[axis][lane] = center[axis];
+            self.half_boxes[axis][lane] = half_box[axis];
+        }
+        self.count += 1;
+    }
 }
 
 /// The state with which a thread draws one tile after another.
@@ -177,14 +202,13 @@ impl<'a> TileWalk<'a> {
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let Self { frame, open, rays, ring, buffers, tally, .. } = self;
-                ring.take(slot_of(sheet), &mut buffers.sheet);
                 if sheet < frame.projection.window.start {
                     // Another part composites it.
-                    buffers.sheet.clear();
+                    ring.sheet(sheet).clear(simd);
                     return;
                 }
                 let begin = rays.begin(frame.projection.direction * sheet);
-                let tiles = frame.compositor.composite(simd, buffers, (rays, begin), open);
+                let tiles = frame.compositor.composite(simd, &mut ring.sheet(sheet), buffers, (rays, begin), open);
                 if frame.touched.contains(&sheet) {
                     tally.tiles_composited += tiles;
                 }
@@ -281,54 +305,51 @@ impl<'a> TileWalk<'a> {
             starting = self.sorted_by_depth(&starting);
         }
         let mut batch = Batch::new(&self.frame.projection, self.frame.amplitude);
+        let mut starts = Starts::default();
+        let shift = self.frame.projection.shift(self.origin);
         for waiting in &starting {
-            self.start_voxels(simd, waiting, sheet, &mut batch);
+            let Arrived { place, half_box, .. } = self.arrived[waiting.brick as usize];
+            for slot in bits(waiting.voxels) {
+                starts.add([waiting.brick, slot], self.frame.projection.center(place, slot, shift), half_box);
+                if starts.count == LANES {
+                    self.start_voxels(simd, &mut starts, sheet, &mut batch);
+                }
+            }
         }
+        self.start_voxels(simd, &mut starts, sheet, &mut batch);
         self.draw_batch(simd, &mut batch);
         self.queue.reuse(starting);
     }
 
-    /// Draws those of a brick's voxels that are seen, in batches.
+    /// Draws those of up to eight voxels that are seen, in batches.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn start_voxels<S: Simd>(&mut self, simd: S, waiting: &Waiting, sheet: i32, batch: &mut Batch<'a>) {
+    fn start_voxels<S: Simd>(&mut self, simd: S, starts: &mut Starts, sheet: i32, batch: &mut Batch<'a>) {
         let frame = self.frame;
-        let Arrived { number, brick, place: brick_place, half_box, .. } = self.arrived[waiting.brick as usize];
-        let mut kept = None;
-        let mut seen = 0;
-        for first in (0..BRICK_VOXELS as usize).step_by(LANES) {
-            let lanes = waiting.voxels >> first & 0xff;
-            if lanes == 0 {
-                continue;
-            }
-            let centers = frame.projection.centers(brick_place, first, self.origin);
-            // In perspective these contain the boxes of all sections.
-            let boxes = Boxes::within(simd, &centers, half_box);
-            let flat = frame.projection.flat_sections(brick_place, first, sheet);
-            for lane in bits(lanes) {
-                let lane = lane as usize;
-                let Some(pixels) = boxes.pixels(lane).filter(|pixels| self.open.sees(pixels)) else { continue };
-                let slot = (first + lane) as u32;
-                seen |= 1 << slot;
-                let voxel = brick::origin(&brick) + brick::in_brick(slot);
-                batch.materials[batch.count] = match &frame.voxels {
-                    Voxels::Whole { channels, materials, .. } => {
-                        let kept = *kept.get_or_insert_with(|| materials.of_brick(number, channels, &brick));
-                        kept.map(|of| materials.of_slot(of, slot)).ok_or(voxel)
-                    }
-                    Voxels::Streamed(_) => Err(voxel),
-                };
-                let along_ray = match &flat {
-                    Some(flat) => batch.flat(flat, lane),
-                    None => batch.lens(frame, frame.projection.of_voxel(brick_place, slot), voxel, sheet),
-                };
-                let on_tile = ([centers[0][lane], centers[1][lane]], pixels);
-                batch.add([waiting.brick, slot], sheet, along_ray, on_tile);
-                if batch.count == LANES {
-                    self.draw_batch(simd, batch);
+        // In perspective these contain the boxes of all sections.
+        let boxes = Boxes::within(simd, &starts.centers, &starts.half_boxes);
+        for lane in 0..std::mem::take(&mut starts.count) {
+            let Some(pixels) = boxes.pixels(lane).filter(|pixels| self.open.sees(pixels)) else { continue };
+            let [arrived, slot] = starts.voxels[lane];
+            let Arrived { number, brick, place, .. } = self.arrived[arrived as usize];
+            self.marks[arrived as usize * frame.drawn.masks] |= 1 << slot;
+            let voxel = brick::origin(&brick) + brick::in_brick(slot);
+            batch.materials[batch.count] = match &frame.voxels {
+                Voxels::Whole { channels, materials, .. } => {
+                    let kept = materials.of_brick(number, channels, &brick);
+                    kept.map(|of| materials.of_slot(of, slot)).ok_or(voxel)
                 }
+                Voxels::Streamed(_) => Err(voxel),
+            };
+            let along_ray = match frame.projection.view.perspective {
+                None => batch.flat(frame.projection.flat_sections(place, slot, sheet)),
+                Some(_) => batch.lens(frame, frame.projection.of_voxel(place, slot), voxel, sheet),
+            };
+            let center = [starts.centers[0][lane], starts.centers[1][lane]];
+            batch.add([arrived, slot], sheet, along_ray, (center, pixels));
+            if batch.count == LANES {
+                self.draw_batch(simd, batch);
             }
         }
-        self.marks[waiting.brick as usize * frame.drawn.masks] |= seen;
     }
 
     /// Voxels that are composited one by one, sorted by depth, equal ones by their position in memory.

@@ -110,13 +110,20 @@ pub(super) fn power<S: Simd>(simd: S, x: f32x8<S>, y: f32) -> f32x8<S> {
     is_zero.select(f32x8::splat(simd, 0.0), exp2(simd, scaled))
 }
 
+/// The polynomial of 4 of 16 coefficients, given z and z².
+// No closure, which would not be compiled for the instruction set.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn cubic<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], at: usize, [z, squared]: [V; 2]) -> V {
+    (z * c[at + 1] + c[at]) + squared * (z * c[at + 3] + c[at + 2])
+}
+
 /// A polynomial of 16 coefficients, the constant one first.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], z: V) -> V {
     let squared = z * z;
     let fourth = squared * squared;
-    let cubic = |at: usize| (z * c[at + 1] + c[at]) + squared * (z * c[at + 3] + c[at + 2]);
-    (cubic(0) + fourth * cubic(4)) + (fourth * fourth) * (cubic(8) + fourth * cubic(12))
+    let (z, eighth) = ([z, squared], fourth * fourth);
+    (cubic(c, 0, z) + fourth * cubic(c, 4, z)) + eighth * (cubic(c, 8, z) + fourth * cubic(c, 12, z))
 }
 
 /// The same without the last four coefficients.
@@ -124,8 +131,8 @@ pub(super) fn polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16],
 pub(super) fn short_polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], z: V) -> V {
     let squared = z * z;
     let fourth = squared * squared;
-    let cubic = |at: usize| (z * c[at + 1] + c[at]) + squared * (z * c[at + 3] + c[at + 2]);
-    (cubic(0) + fourth * cubic(4)) + (fourth * fourth) * cubic(8)
+    let (z, eighth) = ([z, squared], fourth * fourth);
+    (cubic(c, 0, z) + fourth * cubic(c, 4, z)) + eighth * cubic(c, 8, z)
 }
 
 #[cfg(test)]

@@ -7,10 +7,11 @@ use glam::DVec3;
 use super::cells::Bits;
 use super::frame::Frame;
 use super::planes::{Plane, PlaneRow};
+use super::sheet::SlabSheet;
 use crate::cpu::count::bits;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::cut::TileRays;
-use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
+use crate::cpu::sheets::{Buffers, CHANNELS, COLUMNS, ROWS};
 use crate::cpu::vector::LANES;
 use crate::settings::splatting::Compositing;
 
@@ -80,7 +81,7 @@ impl Frame<'_> {
         planes: &mut [Plane; 2],
         wanted: &[u32; ROWS],
         open: &mut OpenMask,
-        buffers: &mut Buffers,
+        (sheet, buffers): (&mut SlabSheet, &mut Buffers),
     ) {
         for (row, bits) in wanted.iter().enumerate() {
             for column in (0..COLUMNS).step_by(LANES) {
@@ -94,8 +95,8 @@ impl Frame<'_> {
                 if self.compositing == Compositing::Surface {
                     let found = self.find_surfaces(simd, &slab, looks, planes, [column, row], buffers);
                     open.close(row, found << column);
-                } else if self.sheet(simd, &slab, looks, planes, [column, row], &mut buffers.sheet.rows[row]) {
-                    buffers.sheet.mark(row, column);
+                } else if let Some(amounts) = self.amounts(simd, &slab, looks, planes, [column, row]) {
+                    sheet.add(simd, [column, row], amounts);
                 }
             }
         }
@@ -244,17 +245,16 @@ impl Frame<'_> {
         ]
     }
 
-    /// The sheet of eight pixels; whether any of them shows something.
+    /// What a slab adds to eight pixels, by channel; `None` if none of them shows anything.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn sheet<S: Simd>(
+    fn amounts<S: Simd>(
         &self,
         simd: S,
         slab: &Slab<S>,
         looks: &Looks<'_>,
         planes: &mut [Plane; 2],
         [column, row]: [usize; 2],
-        sheet: &mut [[f32; COLUMNS]; 4],
-    ) -> bool {
+    ) -> Option<[f32x8<S>; CHANNELS]> {
         let at = [looks.origin[0] + column, looks.origin[1] + row];
         let middles = self.labels.then(|| looks.middles(slab.number, [column, row]));
         let label = |lane: usize| middles.and_then(|middles| self.label(at, lane, middles[lane]));
@@ -263,7 +263,7 @@ impl Frame<'_> {
         let zero = f32x8::splat(simd, 0.0);
         let visible = slab.lanes & means.amount.simd_gt(zero).to_bitmask() as u32;
         if visible == 0 {
-            return false;
+            return None;
         }
         let (mut amount, mut color) = (means.amount, means.color);
         if let Some([red, green, blue, alpha]) = self.slab_colors(simd, slab, visible, planes, [column, row]) {
@@ -286,13 +286,7 @@ impl Frame<'_> {
         let visible = mask(simd, visible);
         let [red, green, blue] = color.map(|channel| visible.select(channel * amount, zero));
         let amount = visible.select(amount, zero);
-        for (sums, amounts) in sheet.iter_mut().zip([red, green, blue, amount]) {
-            let sums = &mut sums[column..column + LANES];
-            let is_first = self.channel == 0;
-            let sum = if is_first { amounts } else { amounts + f32x8::from_slice(simd, sums) };
-            sum.store_slice(sums);
-        }
-        true
+        Some([red, green, blue, amount])
     }
 
     /// Colours shaded by gradients.
@@ -309,7 +303,7 @@ impl Frame<'_> {
         let length = (x * x + y * y + z * z).sqrt();
         let is_flat = length.simd_lt(splat(self.min_gradient));
         let per_length = is_flat.select(splat(0.0), splat(-1.0) / is_flat.select(splat(1.0), length));
-        self.shader.color(simd, color, gradient.map(|component| component * per_length), to_eye)
+        self.shader.color(simd, color, [x * per_length, y * per_length, z * per_length], to_eye)
     }
 
     /// The length of gradients, values per world unit.

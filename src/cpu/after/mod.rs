@@ -3,7 +3,7 @@
 //!
 //! ```text
 //! coefficients ─→ the bricks in whose cells values can meet an opacity
-//! bricks ─ bin ─→ every tile of 32×32 pixels, its slabs front to back:
+//! bricks ─ bin ─→ every tile of 32×64 pixels, its slabs front to back:
 //!                   cull       bricks whose pixels are opaque
 //!                   field      the values of open pixels on the slab's two planes, gradients where something is visible
 //!                   classify   the slab, eight pixels at a time
@@ -24,6 +24,7 @@ mod matter;
 mod needs;
 mod place;
 mod planes;
+mod sheet;
 mod slab_integral;
 mod surface;
 mod tile;

@@ -12,6 +12,7 @@ use super::extreme::{Chosen, is_choice};
 use super::frame::Frame;
 use super::place::ScreenBox;
 use super::planes::Plane;
+use super::sheet::SlabSheet;
 use crate::cpu::bin::Placed;
 use crate::cpu::count::Tally;
 use crate::cpu::cull::{OpenMask, Pixels, columns_between};
@@ -33,6 +34,7 @@ pub(super) struct TileWalk<'a> {
     open: OpenMask,
     rays: TileRays,
     to_eye: Vec<[[f32; COLUMNS]; 3]>,
+    sheet: SlabSheet,
     buffers: Buffers,
     chosen: Chosen,
     tally: Tally,
@@ -62,6 +64,7 @@ impl<'a> TileWalk<'a> {
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
             to_eye: Vec::new(),
+            sheet: SlabSheet::new(),
             buffers: Buffers::new(),
             chosen: Chosen::new(frame.compositing, frame.field.has_colors()),
             tally: Tally::default(),
@@ -78,6 +81,7 @@ impl<'a> TileWalk<'a> {
         bricks: &[u32],
     ) -> (&Buffers, &TileRays, Tally) {
         let mut bricks = bricks.iter().map(|&at| &placed[at as usize]).peekable();
+        self.sheet.clear();
         self.buffers.clear();
         self.chosen.clear();
         self.tally = Tally::default();
@@ -179,7 +183,7 @@ impl<'a> TileWalk<'a> {
     /// Classifies and composites a slab.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
-        let Self { frame, open, rays, to_eye, buffers, tally, channels, chosen, .. } = self;
+        let Self { frame, open, rays, to_eye, sheet, buffers, tally, channels, chosen, .. } = self;
         let looks = Looks::new(self.origin, rays, to_eye);
         for channel in channels.iter_mut().filter(|channel| !channel.active.is_empty()) {
             let wanted = channel.wanted(open);
@@ -187,14 +191,14 @@ impl<'a> TileWalk<'a> {
             if is_choice(frame.compositing) {
                 frame.choose(simd, &looks, planes, &wanted, chosen);
             } else {
-                frame.classify(simd, slab, &looks, planes, &wanted, open, buffers);
+                frame.classify(simd, slab, &looks, planes, &wanted, open, (sheet, buffers));
             }
         }
         if is_choice(frame.compositing) || frame.compositing == Compositing::Surface {
             return;
         }
         let begin = rays.begin(slab);
-        let tiles = frame.compositor.composite(simd, buffers, (rays, begin), open);
+        let tiles = frame.compositor.composite(simd, sheet, buffers, (rays, begin), open);
         if self.touched.contains(&slab) {
             tally.tiles_composited += tiles;
         }

@@ -14,6 +14,7 @@ use crate::after::normalization::Normalization;
 use crate::cpu::after::{self, Matter};
 use crate::cpu::frame::{Drawing, Frame, Host, Voxels};
 use crate::cpu::project::Projection;
+use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::cpu::simd::{self, Simd};
 use crate::cpu::{check, statistics};
 use crate::error::RenderError;
@@ -187,7 +188,8 @@ impl StreamRenderer {
         if all <= memory as f64 {
             return Ok(());
         }
-        let found = format!("{}, in which 32×32 pixels see a box of voxels of {bytes:.0} bytes", self.values.level);
+        let found =
+            format!("{}, in which {COLUMNS}×{ROWS} pixels see a box of voxels of {bytes:.0} bytes", self.values.level);
         let allowed =
             format!("a coarser level, more pixels, or more memory than {memory} bytes for all threads' boxes");
         Err(SettingError::new("volume.level", found, allowed))

@@ -175,9 +175,13 @@ impl Field<'_> {
         if first.cmpgt(UVec3::ZERO).all() && (last + 1).cmplt(dims).all() {
             let at = row.index + from;
             let half = f32x8::splat(simd, self.scale * 0.5);
-            let across = |step: usize| load(simd, values, at + step) * half - load(simd, values, at - step) * half;
             let (nx, ny) = (held.x as usize, held.y as usize);
-            let [x, y, z] = [across(1), across(nx), across(nx * ny)];
+            let [x, y, z] = [1, nx, nx * ny];
+            let [x, y, z] = [
+                across(simd, values, at, x, half),
+                across(simd, values, at, y, half),
+                across(simd, values, at, z, half),
+            ];
             let is_known = x.simd_eq(x) & y.simd_eq(y) & z.simd_eq(z);
             // Otherwise a hole is near.
             if is_weighted.to_bitmask() & !is_known.to_bitmask() == 0 {
@@ -243,6 +247,13 @@ impl<S: Simd> Sums<S> {
         let [x, y, z] = self.sums;
         [sum_of(x) * per_weight, sum_of(y) * per_weight, sum_of(z) * per_weight]
     }
+}
+
+/// The differences of eight voxels, from one on, over a step in memory to either side, times a factor.
+// No closure, which would not be compiled for the instruction set.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn across<S: Simd>(simd: S, values: ValueSlice<'_>, at: usize, step: usize, factor: f32x8<S>) -> f32x8<S> {
+    load(simd, values, at + step) * factor - load(simd, values, at - step) * factor
 }
 
 /// Eight numbers, from one on; NaN beyond the last one.
