@@ -24,14 +24,14 @@ LOOK: dict[str, Any] = {
 
 
 def write_store(path: pathlib.Path, values: np.ndarray) -> None:
-    """Writes a Zarr array of bytes `[…, z, y, x]` in chunks; those of zeros are left out."""
+    """Writes a Zarr array `[…, z, y, x]` in chunks; those of zeros are left out."""
     chunks = [1] * (values.ndim - 3) + [CHUNK] * 3
     path.mkdir()
     metadata = {
         "zarr_format": 2,
         "shape": values.shape,
         "chunks": chunks,
-        "dtype": "|u1",
+        "dtype": values.dtype.str,
         "order": "C",
         "compressor": None,
         "filters": None,
@@ -48,7 +48,7 @@ def write_store(path: pathlib.Path, values: np.ndarray) -> None:
 def ball(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
     """A Zarr array of a ball, whose chunks of zeros are left out."""
     z, y, x = np.ogrid[-1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j]
-    values = np.clip(300 * (0.8 - np.sqrt(x * x + y * y + z * z)), 0, 250).astype(np.uint8)
+    values = np.clip(300 * (0.8 - np.sqrt(x * x + y * y + z * z)), 0, 250).round().astype("<f4")
     path = tmp_path_factory.mktemp("stores") / "ball.zarr"
     write_store(path, values)
     return path
@@ -102,7 +102,7 @@ def test_an_index_spares_chunks(ball: pathlib.Path, tmp_path: pathlib.Path) -> N
 
 def test_channels_are_streamed(tmp_path: pathlib.Path) -> None:
     z, y, x = np.ogrid[-1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j, -1 : 1 : SIDE * 1j]
-    ball = lambda at: np.clip(300 * (0.6 - np.sqrt((x - at) ** 2 + y * y + z * z)), 0, 180).astype(np.uint8)
+    ball = lambda at: np.clip(300 * (0.6 - np.sqrt((x - at) ** 2 + y * y + z * z)), 0, 180).astype("<f4")
     path = tmp_path / "two.zarr"
     write_store(path, np.stack([ball(-0.2), ball(0.3)]))
     opacity = [[0, 0], [60, 0], [200, 0.8]]
@@ -119,6 +119,21 @@ def test_channels_are_streamed(tmp_path: pathlib.Path) -> None:
     assert 0 < hidden.stats["chunks_read"] <= total / 2
     parts = [streamed.part(slabs=slabs) for slabs in ((-1000, 0), (0, 1000))]
     np.testing.assert_allclose(np.asarray(sheetsplat.merge(parts)), np.asarray(pictures[1]), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["uint8", "int16", "uint16"])
+def test_stores_of_few_bits_are_held_in_them(kind: str, tmp_path: pathlib.Path) -> None:
+    values = np.random.default_rng(0).integers(-100, 100, (2, SIDE, SIDE, SIDE)).astype(np.int16)
+    values = (values if kind == "int16" else values + 1000 if kind == "uint16" else values + 100).astype(kind)
+    # Larger ones come late.
+    values[:, SIDE // 2 :] += 30
+    path = tmp_path / "few.zarr"
+    write_store(path, values)
+    # Four bytes for each would be 6.8 MiB.
+    volume = Volume(path, memory="5MiB")
+    assert not volume.streamed and volume.nbytes == values.nbytes
+    np.testing.assert_array_equal([volume.values, volume.values_of(1)], values)
+    assert Volume(path, memory="3MiB", channel=1).nbytes == values[1].nbytes
 
 
 def test_what_needs_all_values_is_refused(ball: pathlib.Path) -> None:

@@ -116,6 +116,10 @@ impl Store for AdaptedStore {
         self.store.fill()
     }
 
+    fn value_bytes(&self) -> u64 {
+        self.store.value_bytes()
+    }
+
     fn range(&self, level: usize) -> Option<[f32; 2]> {
         self.store.range(level)
     }

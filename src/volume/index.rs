@@ -259,6 +259,10 @@ impl Store for IndexedStore {
         self.store.fill()
     }
 
+    fn value_bytes(&self) -> u64 {
+        self.store.value_bytes()
+    }
+
     fn range(&self, level: usize) -> Option<[f32; 2]> {
         self.index.range(level)
     }

@@ -12,6 +12,7 @@ use super::samples::Samples;
 use super::series::{Series, SeriesOrder};
 use super::source::{invalid, io_error};
 use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
+use super::voxel::Voxel;
 use super::{Grid, StoreFacts, VolumeError};
 
 /// The sizes of a chunk, unless the volume is smaller: any box can be read, so these only divide it into parts of a convenient size.
@@ -173,6 +174,10 @@ impl Store for FileStore {
     /// A hole, though the file holds every chunk.
     fn fill(&self) -> f32 {
         f32::NAN
+    }
+
+    fn value_bytes(&self) -> u64 {
+        f32::bytes(self.located.samples.kind, self.located.samples.rescale.is_some())
     }
 
     fn facts(&self) -> StoreFacts {

@@ -39,6 +39,11 @@ pub trait Store: Send + Sync + Debug {
     /// The value of every voxel in a chunk that the store does not hold.
     fn fill(&self) -> f32;
 
+    /// The greatest number of bytes that a value takes in a volume in memory, among others: 1, 2 or 4.
+    fn value_bytes(&self) -> u64 {
+        size_of::<f32>() as u64
+    }
+
     /// The minimum and maximum of a level's values, holes aside, if the store knows them. Images of a volume classified after splatting then have the same bytes as those of
     /// one in memory, whose numbers are scaled by this range; else the same to rounding.
     fn range(&self, _level: usize) -> Option<[f32; 2]> {

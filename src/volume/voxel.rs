@@ -144,7 +144,7 @@ impl Voxel for f32 {
 
     fn bytes(kind: SampleType, is_rescaled: bool) -> u64 {
         let whole = size_of::<Self>() as u64;
-        if is_rescaled { whole } else { kind.bytes().min(whole) }
+        if is_rescaled || cfg!(target_arch = "wasm32") { whole } else { kind.bytes().min(whole) }
     }
 }
 

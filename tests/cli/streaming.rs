@@ -6,16 +6,16 @@ use serde_json::{Value, json};
 
 use crate::*;
 
-/// A file of bytes without a header, of a solid ball: 18 MiB as numbers of 4 bytes.
+/// A file without a header, of a solid ball: 18 MiB.
 pub(crate) fn write_ball(folder: &Folder) -> &'static str {
     let [nx, ny, nz] = [192_u32, 160, 155];
     let value = |[x, y, z]: [u32; 3]| {
         let [x, y, z] = [(x, nx), (y, ny), (z, nz)].map(|(at, count)| f64::from(at) / f64::from(count - 1) - 0.5);
-        (600.0 * (0.45 - (x * x + y * y + z * z).sqrt())).clamp(0.0, 250.0) as u8
+        (600.0 * (0.45 - (x * x + y * y + z * z).sqrt())).clamp(0.0, 250.0).trunc() as f32
     };
     let voxels = (0..nz).flat_map(|z| (0..ny).flat_map(move |y| (0..nx).map(move |x| [x, y, z])));
-    folder.write("ball.raw", voxels.map(value).collect::<Vec<u8>>());
-    "ball.raw --dims 192,160,155 --type uint8 --set splatting.classification=before --set image={width=120,height=90}"
+    folder.write("ball.raw", voxels.flat_map(|voxel| value(voxel).to_le_bytes()).collect::<Vec<u8>>());
+    "ball.raw --dims 192,160,155 --type float32 --endian little --set splatting.classification=before --set image={width=120,height=90}"
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn everything_is_drawn_of_a_volume_larger_than_memory() {
     // Facts are told by a sample.
     let info = folder.run_with(&two, "", &format!("info {ball} --json --memory 17MiB"));
     let info: Value = serde_json::from_str(&info.stdout).unwrap();
-    assert_eq!((info["dims"].clone(), info["type"].clone()), (json!([192, 160, 155]), json!("uint8")));
+    assert_eq!((info["dims"].clone(), info["type"].clone()), (json!([192, 160, 155]), json!("float32")));
     assert_eq!((info["format"].clone(), info["sample"].clone()), (json!("raw"), json!([64, 54, 52])));
     assert!(info["max"].as_f64().unwrap() > 200.0, "{info}");
     // Parts of a store and of its values do not mix, as only the latter are known value by value.
@@ -139,7 +139,7 @@ fn everything_is_drawn_of_a_volume_larger_than_memory() {
         .assert_failure(2, &["whole-1.exr: scene: found ", ", as in streamed-0.exr"]);
 }
 
-/// An OME-Zarr image of three channels of 64³ bytes, each a ball in another corner, in chunks of 16³: 3 MiB as numbers of 4 bytes. Chunks of zeros are left out.
+/// An OME-Zarr image of three channels of 64³ numbers, each a ball in another corner, in chunks of 16³: 3 MiB. Chunks of zeros are left out.
 fn write_channels(folder: &Folder) {
     const SIDE: u32 = 64;
     let axes =
@@ -149,9 +149,9 @@ fn write_channels(folder: &Folder) {
         "version": "0.5", "multiscales": [{"axes": axes, "datasets": [dataset]}],
     }}});
     let array = json!({
-        "zarr_format": 3, "node_type": "array", "shape": [3, SIDE, SIDE, SIDE], "data_type": "uint8", "fill_value": 0,
+        "zarr_format": 3, "node_type": "array", "shape": [3, SIDE, SIDE, SIDE], "data_type": "float32", "fill_value": 0,
         "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [1, 16, 16, 16]}},
-        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}}, "codecs": [{"name": "bytes"}],
+        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}}, "codecs": [{"name": "bytes", "configuration": {"endian": "little"}}],
     });
     fs::create_dir_all(folder.path("three.zarr/0")).unwrap();
     folder.write("three.zarr/zarr.json", group.to_string());
@@ -159,7 +159,7 @@ fn write_channels(folder: &Folder) {
     for (channel, chunk) in (0..3).flat_map(|channel| (0..64).map(move |chunk: u32| (channel, chunk))) {
         let low = [chunk % 4, chunk / 4 % 4, chunk / 16].map(|at| 16 * at);
         let value = |index: u32| ball(channel, [index % 16 + low[0], index / 16 % 16 + low[1], index / 256 + low[2]]);
-        let bytes: Vec<u8> = (0..16 * 16 * 16).map(|index| value(index) as u8).collect();
+        let bytes: Vec<u8> = (0..16 * 16 * 16).flat_map(|index| value(index).to_le_bytes()).collect();
         if bytes.iter().any(|&byte| byte > 0) {
             let path =
                 folder.path(&format!("three.zarr/0/c/{channel}/{}/{}/{}", low[2] / 16, low[1] / 16, low[0] / 16));
@@ -210,7 +210,7 @@ fn channels_of_an_image_larger_than_memory_are_streamed() {
         let stats = assert_streamed_alike(&folder, &shown, "2MiB");
         assert_eq!((of(&stats, "chunks_total"), of(&stats, "voxels_total")), (3 * 64, 64 * 64 * 64), "{backend}");
         assert!((3..3 * 64).contains(&of(&stats, "chunks_read")), "{backend}: {stats}");
-        assert_eq!(of(&stats, "bytes_read"), of(&stats, "chunks_read") * 16 * 16 * 16, "{backend}");
+        assert_eq!(of(&stats, "bytes_read"), of(&stats, "chunks_read") * 4 * 16 * 16 * 16, "{backend}");
         // A hidden channel, and one without opacity.
         let hidden = format!("{shown} --set channel[0].visible=false --set channel[2].transfer.opacity=[[0,0]]");
         let fewer = assert_streamed_alike(&folder, &hidden, "2MiB");
@@ -263,19 +263,21 @@ fn channels_of_an_image_larger_than_memory_are_streamed() {
 #[test]
 fn channels_of_several_files_larger_than_memory_are_streamed() {
     let folder = Folder::new();
-    // 4.4 MiB as numbers of 4 bytes, and half of it as labels.
+    // 4.4 MiB each, and half of it as labels.
     let dims = [112_u32, 104, 100];
     let header = |kind: &str, [x, y, z]: [u32; 3]| {
-        format!("NRRD0004\ntype: {kind}\ndimension: 3\nsizes: {x} {y} {z}\nspacings: 1 1 2\nencoding: raw\n\n")
+        format!(
+            "NRRD0004\ntype: {kind}\ndimension: 3\nsizes: {x} {y} {z}\nspacings: 1 1 2\nencoding: raw\nendian: little\n\n"
+        )
     };
-    let write = |name: &str, value: &dyn Fn([u32; 3]) -> u8| {
+    let write = |name: &str, kind: &str, value: &dyn Fn([u32; 3]) -> Vec<u8>| {
         let voxels =
             (0..dims.iter().product()).map(|at| [at % dims[0], at / dims[0] % dims[1], at / dims[0] / dims[1]]);
-        folder.write(name, [header("uchar", dims).into_bytes(), voxels.map(value).collect()].concat());
+        folder.write(name, [header(kind, dims).into_bytes(), voxels.flat_map(value).collect()].concat());
     };
-    write("0.nrrd", &|voxel| ball(0, voxel.map(|at| at / 2)) as u8);
-    write("1.nrrd", &|voxel| ball(1, voxel.map(|at| at / 2)) as u8);
-    write("labels.nrrd", &|[x, y, _]| u8::from(x > 60) + 2 * u8::from(y > 60));
+    write("0.nrrd", "float", &|voxel| ball(0, voxel.map(|at| at / 2)).to_le_bytes().into());
+    write("1.nrrd", "float", &|voxel| ball(1, voxel.map(|at| at / 2)).to_le_bytes().into());
+    write("labels.nrrd", "uchar", &|[x, y, _]| vec![u8::from(x > 60) + 2 * u8::from(y > 60)]);
     folder.write("small.nrrd", [header("uchar", [100; 3]).into_bytes(), vec![7; 1_000_000]].concat());
     let scene = |second: &str, labels: &str| {
         format!(

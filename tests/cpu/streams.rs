@@ -217,7 +217,7 @@ fn failures_are_errors() {
     let large =
         Arc::new(LargeStore([StoreLevel { grid: Grid::new(UVec3::splat(1024), DVec3::ONE), chunk: UVec3::splat(64) }]));
     let error = renderer(large, 0, &volume, &small, 1 << 24).unwrap().draw().unwrap_err().to_string();
-    assert!(error.starts_with("volume.level: found 0, in which 32×32 pixels see a box of voxels of "), "{error}");
+    assert!(error.starts_with("volume.level: found 0, in which 32×64 pixels see a box of voxels of "), "{error}");
     let labelled = store::streamed(store.clone(), 0, &volume, 1 << 30);
     let several = StreamedVolume { further: vec![labelled.first.clone()], ..labelled.clone() };
     let labels = Some(StreamedLevel::new("labels", store.clone(), 0));

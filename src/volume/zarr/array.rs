@@ -78,7 +78,7 @@ pub(super) struct Region {
 
 impl Region {
     /// The number of values.
-    fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         (self.channels.end - self.channels.start) as usize * self.dims.as_usizevec3().element_product()
     }
 
@@ -220,6 +220,46 @@ impl ZarrArray {
         let [first, end] = region.bounds();
         let low: Sizes = std::array::from_fn(|axis| first[axis] / self.chunk[axis]);
         [low, std::array::from_fn(|axis| end[axis].div_ceil(self.chunk[axis]) - low[axis])]
+    }
+
+    /// How samples are stored.
+    pub(super) fn kind(&self) -> SampleType {
+        self.kind
+    }
+
+    /// The layers of voxels of a piece in which values are read, so that not all of them must be in memory before they take fewer bits; `None` where they
+    /// never do, or where chunks hold several channels.
+    fn thickness<T: Voxel>(&self) -> Option<u32> {
+        let [_, of_channels, thickness, ..] = self.chunk;
+        let is_narrower = T::bytes(self.kind, false) < size_of::<T>() as u64;
+        (is_narrower && of_channels == 1).then(|| thickness.min(self.dims().z.into()) as u32)
+    }
+
+    /// The bytes that some channels of the whole array take in memory at most, while they are read.
+    pub(super) fn memory<T: Voxel>(&self, channels: u64) -> u64 {
+        let values =
+            |layers: u32| self.dims().with_z(layers).as_u64vec3().to_array().into_iter().fold(1, u64::saturating_mul);
+        let (each, all) = (size_of::<T>() as u64, values(self.dims().z).saturating_mul(channels));
+        match self.thickness::<T>().map(values).filter(|&piece| piece < all) {
+            None => all.saturating_mul(each),
+            Some(piece) => all.saturating_mul(T::bytes(self.kind, false)).saturating_add(piece.saturating_mul(each)),
+        }
+    }
+
+    /// Some channels of the whole array in pieces that follow each other in memory and share no chunks.
+    pub(super) fn pieces<T: Voxel>(&self, channels: Range<u64>, time: u64) -> Vec<Region> {
+        let dims = self.dims();
+        let Some(thickness) = self.thickness::<T>() else {
+            return vec![Region { channels, time, from: UVec3::ZERO, dims }];
+        };
+        let piece = |channel: u64, z: u32| Region {
+            channels: channel..channel + 1,
+            time,
+            from: UVec3::ZERO.with_z(z),
+            dims: dims.with_z(thickness.min(dims.z - z)),
+        };
+        let starts = move || (0..dims.z).step_by(thickness as usize);
+        channels.flat_map(|channel| starts().map(move |z| piece(channel, z))).collect()
     }
 
     /// The number of chunks that a region meets.

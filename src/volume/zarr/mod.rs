@@ -22,14 +22,14 @@ use std::sync::Arc;
 
 use glam::UVec3;
 
-use self::array::Region;
+use self::array::{Held, Region};
 use self::image::{Image, Level};
 use super::access::Access;
 use super::loaded::{Levels, Loaded};
 use super::samples::{SIZES, dims_of};
 use super::source::invalid;
 use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
-use super::voxel::Voxel;
+use super::voxel::{Many, Voxel};
 use super::{Grid, StoreFacts, Values, VolumeError};
 use crate::parallel;
 use crate::stats::StoreCounts;
@@ -41,33 +41,51 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     image.series.check(path, selection)?;
     let channels = image.series.channels(selection);
     let channels = u64::from(channels.start)..u64::from(channels.end);
-    let number = level_of(&image, channels.end - channels.start, size_of::<T>(), path, access)?;
+    let number = level_of::<T>(&image, channels.end - channels.start, path, access)?;
     let level = &image.levels[number];
+    let array = &level.array;
     let dims = level.grid.dims;
     let voxels = dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?.element_product();
     let count = (channels.end - channels.start) * u64::from(voxels);
     let time = u64::from(selection.time.unwrap_or(0));
-    let region = Region { channels, time, from: UVec3::ZERO, dims };
+    let pieces = array.pieces::<T>(channels.clone(), time);
+    let bytes = array.memory::<T>(channels.end - channels.start);
     let found = format!("{} × {} × {} voxels of {} channels", dims.x, dims.y, dims.z, count / u64::from(voxels));
-    access.reserve(path, "data", found, count * size_of::<T>() as u64)?;
-    level.array.reserve::<T>(level.array.at_once(&region), access)?;
-    let mut values = Vec::new();
+    access.reserve(path, "data", found, bytes)?;
+    let at_once = pieces.iter().map(|piece| array.at_once(piece)).max().unwrap_or(0);
+    array.reserve::<T>(at_once, access)?;
     let too_many = |error| invalid(path, "data", format!("{count} samples: {error}"), "fewer");
-    values.try_reserve_exact(count as usize).map_err(too_many)?;
-    values.resize(count as usize, T::HOLE);
-    let held = level.array.read(&region, &mut values)?;
+    let mut values = T::Many::default();
+    let mut held = Held::default();
+    for (at, piece) in pieces.iter().enumerate() {
+        let mut read = Vec::new();
+        read.try_reserve_exact(piece.count()).map_err(too_many)?;
+        read.resize(piece.count(), T::HOLE);
+        let of_piece = array.read(piece, &mut read)?;
+        held = Held { chunks: held.chunks + of_piece.chunks, bytes: held.bytes + of_piece.bytes };
+        match pieces.len() {
+            1 => values = read.into(),
+            _ => {
+                values.append(&read).map_err(too_many)?;
+                // The type is now known.
+                if at == 0 {
+                    values.try_reserve_exact(count as usize - read.len()).map_err(too_many)?;
+                }
+            }
+        }
+    }
     let reads = StoreCounts {
         level: number as u64,
-        chunks_total: level.array.count(&region),
+        chunks_total: pieces.iter().map(|piece| array.count(piece)).sum(),
         chunks_read: held.chunks,
         bytes_read: held.bytes,
-        chunk_bytes: count * size_of::<T>() as u64,
+        chunk_bytes: bytes,
         ..StoreCounts::default()
     };
     let spacing = Some(level.grid.spacing);
     let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
     let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid, reads });
-    Ok(Loaded { spacing, levels, ..image.stated::<T>(number, values.into()) })
+    Ok(Loaded { spacing, levels, ..image.stated::<T>(number, values) })
 }
 
 /// The grids of an image's levels, from the finest.
@@ -75,8 +93,8 @@ pub(super) fn grids(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeErr
     Ok(Image::open(path, access)?.levels.iter().map(|level| level.grid).collect())
 }
 
-/// The number of the level to read: the selected one, or else the finest. Its values, of `bytes` bytes each, must fit in memory.
-fn level_of(image: &Image, channels: u64, bytes: usize, path: &Path, access: &Access) -> Result<usize, VolumeError> {
+/// The number of the level to read: the selected one, or else the finest. Its values must fit in memory.
+fn level_of<T: Voxel>(image: &Image, channels: u64, path: &Path, access: &Access) -> Result<usize, VolumeError> {
     let count = image.levels.len();
     let stated = access.selection().level;
     let number = stated.unwrap_or(0) as usize;
@@ -84,7 +102,7 @@ fn level_of(image: &Image, channels: u64, bytes: usize, path: &Path, access: &Ac
         let allowed = if count == 1 { "0, the only one".to_owned() } else { format!("0 to {}", count - 1) };
         return Err(invalid(path, "level", number, allowed));
     }
-    let needs = |level: &Level| level.grid.voxels().saturating_mul(channels * bytes as u64);
+    let needs = |level: &Level| level.array.memory::<T>(channels);
     let left = access.memory_left();
     let fits = |level: &Level| dims_of(level.grid.dims.to_array()).is_some() && needs(level) <= left;
     if fits(&image.levels[number]) || count == 1 {
@@ -155,6 +173,10 @@ impl Store for ZarrStore {
 
     fn fill(&self) -> f32 {
         self.image.levels[0].array.fill()
+    }
+
+    fn value_bytes(&self) -> u64 {
+        f32::bytes(self.image.levels[0].array.kind(), false)
     }
 
     fn facts(&self) -> StoreFacts {
