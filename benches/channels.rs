@@ -25,10 +25,11 @@ const COUNT: usize = 4;
 const FACTORS: [f64; 2] = [1.0, 0.03];
 
 /// What is compared, and how many times the frames of one channel those of four may cost.
-const CASES: [(Classification, Backend, f64); 3] = [
+const CASES: [(Classification, Backend, f64); 4] = [
     (Classification::Before, Backend::Cpu, 2.5),
     (Classification::Before, Backend::Gpu, 2.5),
     (Classification::After, Backend::Cpu, 4.0),
+    (Classification::After, Backend::Gpu, 4.0),
 ];
 
 fn main() {
