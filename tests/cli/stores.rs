@@ -15,15 +15,19 @@ const STREAMED: &str = "--memory 580000B --level 0 --set image={width=80,height=
                         --set camera.direction=[1,0,0] --set transfer={color=[[0,[1,1,1]]],opacity=[[0,0.9],[255,1]]} \
                         --set splatting={classification=\"before\",culling=false}";
 
+/// The codec of uncompressed numbers.
+fn bytes() -> Value {
+    json!({"name": "bytes", "configuration": {"endian": "little"}})
+}
+
 /// The metadata of an array, in chunks or in shards of 2×2×2 chunks.
 fn array(shape: [usize; 3], codecs: Value, is_sharded: bool) -> Value {
-    let endian = json!({"name": "bytes", "configuration": {"endian": "little"}});
     let shards = json!([{"name": "sharding_indexed", "configuration": {
-        "chunk_shape": vec![CHUNK; 3], "codecs": codecs, "index_codecs": [endian], "index_location": "end",
+        "chunk_shape": vec![CHUNK; 3], "codecs": codecs, "index_codecs": [bytes()], "index_location": "end",
     }}]);
     let outer = if is_sharded { 2 * CHUNK } else { CHUNK };
     json!({
-        "zarr_format": 3, "node_type": "array", "shape": shape, "data_type": "uint8", "fill_value": 0,
+        "zarr_format": 3, "node_type": "array", "shape": shape, "data_type": "float32", "fill_value": 0,
         "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": vec![outer; 3]}},
         "chunk_key_encoding": {"name": "default", "configuration": {"separator": "/"}},
         "codecs": if is_sharded { shards } else { codecs },
@@ -32,7 +36,8 @@ fn array(shape: [usize; 3], codecs: Value, is_sharded: bool) -> Value {
 
 /// The bytes of a chunk, whose values depend on its place.
 fn chunk(at: [usize; 3]) -> Vec<u8> {
-    (0..CHUNK.pow(3)).map(|index| (1 + index % 200 + at.iter().sum::<usize>()) as u8).collect()
+    let value = |index: usize| (1 + index % 200 + at.iter().sum::<usize>()) as f32;
+    (0..CHUNK.pow(3)).flat_map(|index| value(index).to_le_bytes()).collect()
 }
 
 /// Writes an image of two levels, whose coarser one fits into the memory for a sample.
@@ -51,7 +56,7 @@ fn write(folder: &Folder, codecs: &Value, is_sharded: bool) {
     }}});
     write("zarr.json", group.to_string().as_bytes());
     write("0/zarr.json", array(SHAPE, codecs.clone(), is_sharded).to_string().as_bytes());
-    let coarse = array(SHAPE.map(|count| count / 4), json!([{"name": "bytes"}]), false);
+    let coarse = array(SHAPE.map(|count| count / 4), json!([bytes()]), false);
     write("1/zarr.json", coarse.to_string().as_bytes());
     write("1/c/0/0/0", &chunk([0; 3]));
     let counts = SHAPE.map(|count| count / CHUNK);
@@ -68,7 +73,7 @@ fn write(folder: &Folder, codecs: &Value, is_sharded: bool) {
         for inner in all([2; 3]) {
             let at: [usize; 3] = std::array::from_fn(|axis| 2 * shard[axis] + inner[axis]);
             let is_there = (0..3).all(|axis| at[axis] < counts[axis]);
-            let entry = if is_there { [bytes.len() as u64, CHUNK.pow(3) as u64] } else { [u64::MAX; 2] };
+            let entry = if is_there { [bytes.len() as u64, 4 * CHUNK.pow(3) as u64] } else { [u64::MAX; 2] };
             index.extend(entry.map(u64::to_le_bytes).concat());
             bytes.extend(if is_there { chunk(at) } else { Vec::new() });
         }
@@ -93,7 +98,7 @@ fn render(folder: &Folder, backend: &str, rest: &str) -> Run {
 #[test]
 fn damaged_chunks_are_named() {
     let folder = Folder::new();
-    let plain = json!([{"name": "bytes"}]);
+    let plain = json!([bytes()]);
     let damaged = |name: &str, change: &dyn Fn(Vec<u8>) -> Vec<u8>| {
         let path = folder.path("store.zarr").join(name);
         fs::write(&path, change(fs::read(&path).unwrap())).unwrap();
@@ -124,10 +129,10 @@ fn damaged_chunks_are_named() {
         &["0/c/1/1/0: chunk: found ", "in the chunk from [16, 16, 0]", "undamaged chunk of [16, 16, 16]"],
     );
     // Chunks that are not compressed as the metadata say.
-    write(&folder, &json!([{"name": "bytes"}, {"name": "gzip", "configuration": {"level": 5}}]), false);
+    write(&folder, &json!([bytes(), {"name": "gzip", "configuration": {"level": 5}}]), false);
     assert_refused(&folder, &["0/c/", ": chunk: found ", "in the chunk from ["]);
     // Chunks without the checksum that the metadata promise.
-    write(&folder, &json!([{"name": "bytes"}, {"name": "crc32c"}]), true);
+    write(&folder, &json!([bytes(), {"name": "crc32c"}]), true);
     assert_refused(&folder, &["0/c/", ": chunk: found ", "in the chunk from ["]);
 }
 
@@ -136,7 +141,7 @@ fn damaged_chunks_are_named() {
 #[test]
 fn links_in_circles_are_errors() {
     let folder = Folder::new();
-    let plain = json!([{"name": "bytes"}]);
+    let plain = json!([bytes()]);
     write(&folder, &plain, false);
     let path = folder.path("store.zarr/0/c/1/1/0");
     fs::remove_file(&path).unwrap();
@@ -156,7 +161,7 @@ fn links_in_circles_are_errors() {
 #[test]
 fn chunks_missing_against_an_index_are_named() {
     let folder = Folder::new();
-    write(&folder, &json!([{"name": "bytes"}]), false);
+    write(&folder, &json!([bytes()]), false);
     folder.run("index store.zarr -o store.index").assert_success();
     for backend in ["cpu", "gpu"] {
         render(&folder, backend, " --index store.index").assert_success();

@@ -35,7 +35,7 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
     assert!((1..=27).contains(&of("chunks_read")), "{stats}");
     assert_eq!(of("bytes_read") % 64, 0);
     assert!(of("chunk_bytes") <= 17 << 20, "{stats}");
-    assert_eq!((of("sample_chunks_read"), of("sample_bytes_read")), (27, 192 * 160 * 155), "{stats}");
+    assert_eq!((of("sample_chunks_read"), of("sample_bytes_read")), (27, 4 * 192 * 160 * 155), "{stats}");
 
     // With an index the same bytes after splatting, too.
     let after = format!("{stated} --set splatting.classification=after");
@@ -278,7 +278,7 @@ fn channels_of_several_files_larger_than_memory_are_streamed() {
     write("0.nrrd", "float", &|voxel| ball(0, voxel.map(|at| at / 2)).to_le_bytes().into());
     write("1.nrrd", "float", &|voxel| ball(1, voxel.map(|at| at / 2)).to_le_bytes().into());
     write("labels.nrrd", "uchar", &|[x, y, _]| vec![u8::from(x > 60) + 2 * u8::from(y > 60)]);
-    folder.write("small.nrrd", [header("uchar", [100; 3]).into_bytes(), vec![7; 1_000_000]].concat());
+    folder.write("small.nrrd", [header("float", [100; 3]).into_bytes(), vec![7; 4_000_000]].concat());
     let scene = |second: &str, labels: &str| {
         format!(
             "camera = {{direction = [0.3, 1, -0.4], fit = 'volume'}}

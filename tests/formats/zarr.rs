@@ -317,7 +317,7 @@ fn levels_of_an_image() {
     let other = Volume::open_with(&fixture("c.npy"), &ReadOptions::default().with_level(1));
     assert_error(other, "level", &["found 1", "0, the only one"]);
     let small = Volume::open_with(&path, &ReadOptions::default().with_memory(100));
-    assert_error(small, "level", &["0: 5 × 4 × 3, 240 bytes; 1: 2 × 2 × 1, 16 bytes", "level 1 or a coarser one"]);
+    assert_error(small, "level", &["0: 5 × 4 × 3, 220 bytes; 1: 2 × 2 × 1, 16 bytes", "level 1 or a coarser one"]);
 }
 
 /// The metadata with a value replaced.
