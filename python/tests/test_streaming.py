@@ -123,17 +123,18 @@ def test_channels_are_streamed(tmp_path: pathlib.Path) -> None:
 
 @pytest.mark.parametrize("kind", ["uint8", "int16", "uint16"])
 def test_stores_of_few_bits_are_held_in_them(kind: str, tmp_path: pathlib.Path) -> None:
-    values = np.random.default_rng(0).integers(-100, 100, (2, SIDE, SIDE, SIDE)).astype(np.int16)
+    side = 128
+    values = np.random.default_rng(0).integers(-100, 100, (2, side, side, side)).astype(np.int16)
     values = (values if kind == "int16" else values + 1000 if kind == "uint16" else values + 100).astype(kind)
-    # Larger ones come late.
-    values[:, SIDE // 2 :] += 30
+    # Larger values come late.
+    values[:, side // 2 :] += 30
     path = tmp_path / "few.zarr"
     write_store(path, values)
-    # Four bytes for each would be 6.8 MiB.
-    volume = Volume(path, memory="5MiB")
+    # Four bytes for each value would be 16 MiB, and 8 MiB for one channel.
+    volume = Volume(path, memory="14MiB")
     assert not volume.streamed and volume.nbytes == values.nbytes
     np.testing.assert_array_equal([volume.values, volume.values_of(1)], values)
-    assert Volume(path, memory="3MiB", channel=1).nbytes == values[1].nbytes
+    assert Volume(path, memory="7.5MiB", channel=1).nbytes == values[1].nbytes
 
 
 def test_what_needs_all_values_is_refused(ball: pathlib.Path) -> None:

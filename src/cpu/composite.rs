@@ -46,7 +46,7 @@ impl Compositor {
         };
         let has_empty = matches!(self.compositing, Compositing::Surface | Compositing::Minimum);
         let tiles = tiles_of(rows & open.rows());
-        let mut closed = 0;
+        let mut has_closed = false;
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
@@ -59,17 +59,19 @@ impl Compositor {
                 };
                 opaque |= self.vector(simd, pixels, buffers, (rays, begin), [row, vector * LANES]);
             }
-            // Without a branch, which would wait for the row's colours.
-            closed |= opaque & open.row(row);
-            open.close(row, opaque);
+            let opaque = opaque & open.row(row);
+            if opaque != 0 {
+                open.close(row, opaque);
+                has_closed = true;
+            }
         }
-        if closed != 0 {
+        if has_closed {
             open.join();
         }
         tiles
     }
 
-    /// Composites eight pixels of a row, from a column on. Returns the bits of its opaque ones among the row's, or 0 if nothing is culled.
+    /// Composites eight pixels of a row, from a column on. Returns which of the row's pixels are now opaque, as bits; 0 if nothing is culled.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn vector<S: Simd>(
         &self,

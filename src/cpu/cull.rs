@@ -42,7 +42,8 @@ impl Pixels {
     }
 }
 
-/// The pixels of a tile within eight boxes: first and last column and row, the first after the last where there are none.
+/// For each of eight boxes, the first and last column and row of a tile's pixels inside it. Where a box contains no pixel, a first number is larger than
+/// its last one.
 pub(super) struct Boxes {
     columns: [[i32; LANES]; 2],
     rows: [[i32; LANES]; 2],
@@ -62,7 +63,7 @@ impl Boxes {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn of_axis<S: Simd>(simd: S, centers: &[f32; LANES], half: &[f32; LANES], count: f32) -> [[i32; LANES]; 2] {
         let splat = |number: f32| f32x8::splat(simd, number);
-        let [centers, half] = [centers, half].map(|lanes| f32x8::load_array_ref(simd, lanes));
+        let (centers, half) = (f32x8::load_array_ref(simd, centers), f32x8::load_array_ref(simd, half));
         let first = (centers - half).max(splat(0.0)).min(splat(count)).ceil();
         let last = (centers + half).max(splat(-1.0)).min(splat(count - 1.0)).floor();
         [first.to_int::<i32x8<S>>().to_array(), last.to_int::<i32x8<S>>().to_array()]

@@ -13,7 +13,9 @@
 //! Where classification comes after splatting, `after` walks the tiles.
 //!
 //! Functions that work with vectors are inlined into the function that an instruction set is chosen for, or choose it themselves; else their vectors would pass
-//! through memory. So closures with vectors must be small, and arrays of vectors are written out: `map` of an array of them is a call. Builds without optimization are the exception, since there one function with everything inlined would need megabytes of stack.
+//! through memory. A closure that is called several times may be compiled as a function of its own, without the instruction set, and so may `map` of an array of
+//! vectors: inlined functions and arrays written out take their place. Builds without optimization are the exception, since there one function with everything
+//! inlined would need megabytes of stack.
 //!
 //! Stages are those of the GPU, by the same names. The same scene gives the same bytes on every machine (SPEC §12): pixels are `f32` by IEEE
 //! `+ - × ÷ √`, never contracted, and every pixel's sums are taken in one order, whatever the number of threads and the vectors' width.

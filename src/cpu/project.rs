@@ -79,7 +79,7 @@ pub(super) struct Projection {
     /// up in the same order: the least difference would decide between equal sheets.
     least: i32,
     offsets: Offsets,
-    /// The least and the largest of their depths.
+    /// The minimum and maximum depth of these offsets.
     depths: [f64; 2],
     /// How kernels are seen without perspective: all of them alike.
     pub(super) flat: Lens,
@@ -121,12 +121,12 @@ impl Projection {
         brick.plus(Place { x: x[slot], y: y[slot], depth: depth[slot], from_eye: from_eye[slot] })
     }
 
-    /// What is added to the pixel coordinates of places from the image's middle, in a tile given by its first pixel, whose centre is at 0, 0.
+    /// The offset from coordinates relative to the image's middle to coordinates relative to the centre of a tile's first pixel, `origin`.
     pub(super) fn shift(&self, origin: [usize; 2]) -> [f64; 2] {
         std::array::from_fn(|axis| f64::from(self.view.size[axis]) / 2.0 - 0.5 - origin[axis] as f64)
     }
 
-    /// The pixel coordinates of one of a brick's voxels, shifted.
+    /// The pixel coordinates of one of a brick's voxels in a tile, given the tile's [`Self::shift`].
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn center(&self, brick: Place, slot: u32, shift: [f64; 2]) -> [f32; 2] {
         let slot = slot as usize % BRICK_VOXELS as usize;
@@ -185,7 +185,7 @@ impl Projection {
             let reach = self.view.reach / self.view.slabs.width;
             let [lowest, highest] = self.depths.map(|offset| place.depth + offset);
             if self.is_uncut(&self.unclipped(lowest - reach, highest + reach)) {
-                // The ends of all ranges lie behind their starts.
+                // Every voxel has sheets, so that only the start of its range is needed.
                 for (first, offset) in first.iter_mut().zip(&self.offsets.depth) {
                     let depth = place.depth + offset;
                     *first = match self.direction > 0 {
@@ -226,9 +226,9 @@ impl Projection {
         if self.direction > 0 { first..end } else { 1 - end..1 - first }
     }
 
-    /// Whether all of some sheets are composited, so that none of their parts is clipped.
+    /// Whether all of these sheets are composited; then [`Self::reaching`] clips no range among them.
     fn is_uncut(&self, sheets: &Range<i32>) -> bool {
-        sheets.start >= self.window.start && sheets.end <= self.window.end && sheets.start >= self.least
+        sheets.start >= self.window.start && sheets.end <= self.window.end
     }
 
     #[cfg_attr(not(debug_assertions), inline(always))]

@@ -55,20 +55,13 @@ pub(super) struct Ring {
     written: [u32; ROWS],
 }
 
-/// A sheet that is composited.
+/// A sheet, as compositing (eq. 2) reads it.
 pub(super) trait Sheet {
     /// The bits of the rows that are not empty.
     fn rows(&self) -> u64;
 
-    /// The sums of a vector of a row's pixels, by channel, which the sheet no longer holds then; `None` if nothing was added to them.
+    /// Removes the sums of a vector of a row's pixels from the sheet and returns them by channel; `None` if nothing was added to them.
     fn take<S: Simd>(&mut self, simd: S, row: usize, vector: usize) -> Option<[f32x8<S>; CHANNELS]>;
-
-    /// Empties it.
-    fn clear<S: Simd>(&mut self, simd: S) {
-        for (row, vector) in (0..ROWS).flat_map(|row| (0..VECTORS).map(move |vector| (row, vector))) {
-            self.take(simd, row, vector);
-        }
-    }
 }
 
 /// One of the open sheets.
@@ -99,7 +92,7 @@ impl Ring {
     pub(super) fn mark(&mut self, columns: [usize; 2], rows: [usize; 2], slot: usize, count: usize) {
         let [first, last] = columns.map(|column| column / LANES);
         let vectors = ALL_VECTORS >> (VECTORS - 1 - last) & u32::MAX << first;
-        // Those beyond the last one round to the first.
+        // Slots wrap around from the last one to the first.
         let slots = SLOTS & !(u32::MAX << (VECTORS * count));
         let slots = (slots << (VECTORS * slot) | slots >> (VECTORS * (RING - slot))) & SLOTS;
         for row in &mut self.written[rows[0]..=rows[1]] {
@@ -111,7 +104,7 @@ impl Ring {
         self.written == [0; ROWS]
     }
 
-    /// A sheet of those that are open.
+    /// One of the open sheets, given its number.
     pub(super) fn sheet(&mut self, sheet: i32) -> OpenSheet<'_> {
         OpenSheet { slot: slot_of(sheet), ring: self }
     }
@@ -122,6 +115,15 @@ impl Ring {
             if std::mem::take(written) != 0 {
                 pixels.fill(NO_SUMS);
             }
+        }
+    }
+}
+
+impl OpenSheet<'_> {
+    /// Makes it empty.
+    pub(super) fn clear<S: Simd>(&mut self, simd: S) {
+        for (row, vector) in (0..ROWS).flat_map(|row| (0..VECTORS).map(move |vector| (row, vector))) {
+            self.take(simd, row, vector);
         }
     }
 }

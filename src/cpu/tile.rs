@@ -16,7 +16,7 @@ use super::frame::{Frame, Voxels};
 use super::project::Place;
 use super::queue::{Queue, Waiting};
 use super::reached::Reached;
-use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, Sheet, slot_of};
+use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
 use super::splat::Splat;
 use super::stream::{Approach, Chunk, Stream};
 use super::vector::LANES;

@@ -138,11 +138,11 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
     let of_voxels =
         |dims: UVec3, each: u64| dims.to_array().into_iter().fold(each, |all, n| all.saturating_mul(n.into()));
     for channel in std::iter::once(&first).chain(&further) {
-        let value = channel.values.store.value_bytes();
-        for (of, each) in [(Some(&channel.values), value), (channel.labels.as_ref(), 2)] {
+        for (of, is_labels) in [(Some(&channel.values), false), (channel.labels.as_ref(), true)] {
             let Some(StreamedLevel { store, level, .. }) = of else { continue };
             let Some(of) = store.levels().get(*level) else { return Ok(None) };
-            bytes = of_voxels(of.grid.dims, each).saturating_add(bytes);
+            let held = if is_labels { of_voxels(of.grid.dims, 2) } else { store.memory(*level) };
+            bytes = held.saturating_add(bytes);
             largest = largest.max(of_voxels(of.chunk, 4));
         }
     }

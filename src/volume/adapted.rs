@@ -116,8 +116,8 @@ impl Store for AdaptedStore {
         self.store.fill()
     }
 
-    fn value_bytes(&self) -> u64 {
-        self.store.value_bytes()
+    fn memory(&self, level: usize) -> u64 {
+        self.store.memory(level)
     }
 
     fn range(&self, level: usize) -> Option<[f32; 2]> {

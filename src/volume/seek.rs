@@ -11,7 +11,7 @@ use super::loaded::Loaded;
 use super::samples::Samples;
 use super::series::{Series, SeriesOrder};
 use super::source::{invalid, io_error};
-use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
+use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel, values_of};
 use super::voxel::Voxel;
 use super::{Grid, StoreFacts, VolumeError};
 
@@ -176,8 +176,9 @@ impl Store for FileStore {
         f32::NAN
     }
 
-    fn value_bytes(&self) -> u64 {
-        f32::bytes(self.located.samples.kind, self.located.samples.rescale.is_some())
+    fn memory(&self, level: usize) -> u64 {
+        let Samples { kind, rescale, .. } = &self.located.samples;
+        values_of(&self.levels, level).saturating_mul(f32::bytes(*kind, rescale.is_some()))
     }
 
     fn facts(&self) -> StoreFacts {

@@ -39,9 +39,10 @@ pub trait Store: Send + Sync + Debug {
     /// The value of every voxel in a chunk that the store does not hold.
     fn fill(&self) -> f32;
 
-    /// The greatest number of bytes that a value takes in a volume in memory, among others: 1, 2 or 4.
-    fn value_bytes(&self) -> u64 {
-        size_of::<f32>() as u64
+    /// The maximum number of bytes that reading all values of a level into a [`Volume`](super::Volume) takes; a level that the store lacks takes 0. A volume
+    /// for which more than the memory limit is needed is streamed.
+    fn memory(&self, level: usize) -> u64 {
+        values_of(self.levels(), level).saturating_mul(size_of::<f32>() as u64)
     }
 
     /// The minimum and maximum of a level's values, holes aside, if the store knows them. Images of a volume classified after splatting then have the same bytes as those of
@@ -63,6 +64,11 @@ pub trait Store: Send + Sync + Debug {
 
     /// A hash, as hexadecimal digits, of what identifies the store's values: its metadata, never paths or times.
     fn identity(&self) -> String;
+}
+
+/// The number of voxels of one of some levels; 0 for a level that is not among them.
+pub(super) fn values_of(levels: &[StoreLevel], level: usize) -> u64 {
+    levels.get(level).map_or(0, |level| level.grid.voxels())
 }
 
 /// What a file states about a volume beside its grid and values.

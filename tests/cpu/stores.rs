@@ -121,6 +121,40 @@ fn spacings_of_scenes_are_streamed() {
     assert!(drawn == CpuRenderer::new(whole, &scene).unwrap().draw().unwrap().image);
 }
 
+/// What reading a store takes decides whether it is streamed: chunks through the whole depth let all values take four bytes at once, flat ones do not.
+#[test]
+fn stores_that_cannot_be_read_within_the_limit_are_streamed() {
+    let folder = tempfile::tempdir().unwrap();
+    let side = 64_usize;
+    for (thickness, is_whole) in [(16, true), (64, false)] {
+        let path = folder.path().join(format!("{thickness}.zarr"));
+        fs::create_dir(&path).unwrap();
+        let metadata = format!(
+            r#"{{"zarr_format":2,"shape":[{side},{side},{side}],"chunks":[{thickness},16,16],"dtype":"|u1","order":"C","compressor":null,"filters":null,"fill_value":0}}"#
+        );
+        fs::write(path.join(".zarray"), metadata).unwrap();
+        for (z, y, x) in (0..side / thickness).flat_map(|z| (0..4).flat_map(move |y| (0..4).map(move |x| (z, y, x)))) {
+            let chunk: Vec<u8> = (0..thickness * 256)
+                .map(|at| ((z * thickness + at / 256) + 2 * (16 * y + at / 16 % 16) + (16 * x + at % 16)) as u8)
+                .collect();
+            fs::write(path.join(format!("{z}.{y}.{x}")), chunk).unwrap();
+        }
+        let scene = scene(&path, &["splatting.classification=before"]);
+        let open = |memory| scene.open_volume_and_files(&ReadOptions::default().with_memory(memory)).unwrap().0;
+        // A byte for each value are 256 KiB, and four are 1 MiB.
+        let (within, whole) = with_one_thread(|| (open(700 << 10), open(1 << 30)));
+        let OpenVolume::Whole(whole) = whole else { panic!("{thickness}: the volume is not in memory") };
+        assert_eq!(whole.value(UVec3::new(17, 33, 50)), (50 + 2 * 33 + 17) as f32, "{thickness}");
+        let expected = CpuRenderer::new(whole, &scene).unwrap().draw().unwrap().image;
+        let drawn = match within {
+            OpenVolume::Whole(volume) if is_whole => CpuRenderer::new(volume, &scene).unwrap().draw(),
+            OpenVolume::Streamed(volume) if !is_whole => StreamRenderer::new(volume, &scene).unwrap().draw(),
+            _ => panic!("{thickness}: in memory or not?"),
+        };
+        assert!(drawn.unwrap().image == expected, "{thickness}");
+    }
+}
+
 /// Runs something with one thread, because every thread needs some memory.
 fn with_one_thread<T: Send>(run: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(run)

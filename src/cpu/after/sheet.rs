@@ -1,4 +1,4 @@
-//! What a slab adds to a tile's pixels, the sheet that is composited next.
+//! The sheet of one slab where classification comes after splatting (SPEC §9): what every channel adds to the pixels of a tile, until it is composited.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
@@ -23,12 +23,7 @@ impl SlabSheet {
         Self { rows: vec![[[[0.0; LANES]; CHANNELS]; VECTORS]; ROWS], written: [0; ROWS] }
     }
 
-    /// Empties it.
-    pub(super) fn clear(&mut self) {
-        self.written = [0; ROWS];
-    }
-
-    /// Adds to eight pixels, from a column on.
+    /// Adds a channel's amounts to eight pixels, from a column on.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn add<S: Simd>(&mut self, simd: S, [column, row]: [usize; 2], amounts: [f32x8<S>; CHANNELS]) {
         let vector = column / LANES;

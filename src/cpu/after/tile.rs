@@ -81,7 +81,6 @@ impl<'a> TileWalk<'a> {
         bricks: &[u32],
     ) -> (&Buffers, &TileRays, Tally) {
         let mut bricks = bricks.iter().map(|&at| &placed[at as usize]).peekable();
-        self.sheet.clear();
         self.buffers.clear();
         self.chosen.clear();
         self.tally = Tally::default();

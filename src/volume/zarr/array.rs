@@ -200,13 +200,18 @@ impl ZarrArray {
         chunk.max(self.shards.as_ref().map_or(0, Shards::index_bytes))
     }
 
-    /// Reserves the memory for reading `chunks` chunks at once.
-    pub(super) fn reserve<T>(&self, chunks: usize, access: &Access) -> Result<(), VolumeError> {
+    /// The maximum number of bytes that reading `chunks` chunks at once takes, beside the values that are read.
+    pub(super) fn chunk_memory<T>(&self, chunks: usize) -> u64 {
         let decoded = self.in_chunk.saturating_mul(self.kind.bytes() + size_of::<T>() as u64);
         let bytes = decoded.saturating_add(self.encoded_bytes()).saturating_mul(chunks as u64);
         let all: u64 = (0..KINDS).map(|axis| self.shape[axis].div_ceil(self.chunk[axis])).product();
         let indices = if self.shards.is_some() { 32 * all.min(MAX_IN_SHARD) } else { 0 };
-        let bytes = bytes.saturating_add(indices);
+        bytes.saturating_add(indices)
+    }
+
+    /// Reserves the memory for reading `chunks` chunks at once.
+    pub(super) fn reserve<T>(&self, chunks: usize, access: &Access) -> Result<(), VolumeError> {
+        let bytes = self.chunk_memory::<T>(chunks);
         access.reserve(
             &self.keys.path,
             "chunks",
@@ -222,20 +227,15 @@ impl ZarrArray {
         [low, std::array::from_fn(|axis| end[axis].div_ceil(self.chunk[axis]) - low[axis])]
     }
 
-    /// How samples are stored.
-    pub(super) fn kind(&self) -> SampleType {
-        self.kind
-    }
-
-    /// The layers of voxels of a piece in which values are read, so that not all of them must be in memory before they take fewer bits; `None` where they
-    /// never do, or where chunks hold several channels.
+    /// The number of voxels along z of a piece of the array that is read before its values are converted to the type that holds them in the fewest bits;
+    /// `None` if the array is read whole, because its values need all bits of `T`, or because a chunk holds several channels.
     fn thickness<T: Voxel>(&self) -> Option<u32> {
         let [_, of_channels, thickness, ..] = self.chunk;
         let is_narrower = T::bytes(self.kind, false) < size_of::<T>() as u64;
         (is_narrower && of_channels == 1).then(|| thickness.min(self.dims().z.into()) as u32)
     }
 
-    /// The bytes that some channels of the whole array take in memory at most, while they are read.
+    /// The maximum number of bytes that the values of some channels of the whole array take while they are read.
     pub(super) fn memory<T: Voxel>(&self, channels: u64) -> u64 {
         let values =
             |layers: u32| self.dims().with_z(layers).as_u64vec3().to_array().into_iter().fold(1, u64::saturating_mul);
@@ -246,7 +246,7 @@ impl ZarrArray {
         }
     }
 
-    /// Some channels of the whole array in pieces that follow each other in memory and share no chunks.
+    /// Some channels of the whole array, in pieces in the order of memory. A chunk belongs to one piece only.
     pub(super) fn pieces<T: Voxel>(&self, channels: Range<u64>, time: u64) -> Vec<Region> {
         let dims = self.dims();
         let Some(thickness) = self.thickness::<T>() else {

@@ -67,7 +67,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
             1 => values = read.into(),
             _ => {
                 values.append(&read).map_err(too_many)?;
-                // The type is now known.
+                // The first piece tells how many bits most values need.
                 if at == 0 {
                     values.try_reserve_exact(count as usize - read.len()).map_err(too_many)?;
                 }
@@ -175,8 +175,9 @@ impl Store for ZarrStore {
         self.image.levels[0].array.fill()
     }
 
-    fn value_bytes(&self) -> u64 {
-        f32::bytes(self.image.levels[0].array.kind(), false)
+    fn memory(&self, level: usize) -> u64 {
+        let Some(Level { array, .. }) = self.image.levels.get(level) else { return 0 };
+        array.memory::<f32>(1).saturating_add(array.chunk_memory::<f32>(parallel::current_num_threads()))
     }
 
     fn facts(&self) -> StoreFacts {
