@@ -122,6 +122,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                     atomicStore(&is_carried, 1u);
                 }
                 if min(drawn.x, before.x) != NO_NUMBER {
+                    see_table();
                     let slab = slab_between(place, drawn, before, drawn_color, color_before);
                     let light = lighting(px, frame.near > 0.0);
                     if COMPOSITING == SURFACE {

@@ -43,7 +43,7 @@ fn is_visited(at: u32) -> bool {
     if all((brick.present & ~states[at].hidden) == vec2u(0u)) {
         return false;
     }
-    let half_extent = 0.5 * vec3f(vec3u(brick.extent & 0xffu, (brick.extent >> 8u) & 0xffu, brick.extent >> 16u));
+    let half_extent = 0.5 * vec3f(vec3u(brick.extent & 3u, (brick.extent >> 2u) & 3u, (brick.extent >> 4u) & 3u));
     let center = vec4f(vec3f(vec3u(brick.x, brick.y, brick.z)) + half_extent, 1.0);
     let rows = frame.screen_from_voxel;
     let p = homogeneous(center);

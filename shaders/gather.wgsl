@@ -21,6 +21,10 @@ fn layers() -> u32 {
 
 fn begin_layer(layer: u32) {}
 
+fn current_layer() -> u32 {
+    return 0u;
+}
+
 // Nothing is handed on from group to group.
 fn find_handed_on(pixels: Pixels) {}
 

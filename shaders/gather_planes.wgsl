@@ -36,12 +36,23 @@ fn layers() -> u32 {
 
 fn begin_layer(layer: u32) {
     see_channel(layer);
+    see_table();
+    if layer == 0u {
+        halves_handed_here = halves_handed_on;
+        halves_handed_on = 0u;
+        halves_with_sheets = 0u;
+        sheets_of_layers = vec4u(0u);
+    }
     // A constant index spares a gather.
     if CHANNELS == 1u {
         planes = planes_of[0];
     } else {
         planes = planes_of[layer];
     }
+}
+
+fn current_layer() -> u32 {
+    return seen_channel.number;
 }
 
 // Whether the layer is the group's last one, with which its slabs are composited.
@@ -58,9 +69,10 @@ fn draws_all_groups() -> bool {
     return false;
 }
 
-// The previous group may end on a plane whose values hold for the next slab, too; and what one layer shows all must add up.
+// The previous group may end on a plane whose values hold for the next slab, too; and with the last layer what any has shown is composited.
 fn is_due_without_voxels(halves: u32) -> bool {
-    return CHANNELS > 1u || (halves_handed_on & halves) != 0u;
+    let held = halves_handed_here | select(0u, halves_with_sheets, is_last_layer());
+    return (held & halves) != 0u;
 }
 
 fn draws_front_to_back() -> bool {
@@ -115,7 +127,7 @@ fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
     return u32(here.y - here.x);
 }
 
-// Loads the values and differences of the voxels of the queue from `first` on.
+// Loads the layer's values and differences of the voxels of the queue from `first` on.
 fn shade_voxels(first: u32) {
     for (var i = first; i < queue_count; i += lanes) {
         passes += PASSES_PER_LOAD;
@@ -123,18 +135,23 @@ fn shade_voxels(first: u32) {
         let slot = queue_first + min(i + lane, queue_count - 1u);
         let voxel = queue_points[slot].w;
         let at = voxel_of(bricks[voxel / BRICK_VOXELS], voxel % BRICK_VOXELS);
+        // A brick of several layers holds the voxels of each, of which some are holes in others.
+        let is_hole_here = HOLES && CHANNELS > 1u && is_hole(stored_at(index_of(at)));
+        let is_there = is_of_layer(queue_blocks[slot]) && !is_hole_here;
         let number = number_at(index_of(at));
         var gradient = vec3f(0.0);
         if !KERNEL_GRADIENT {
             gradient = half_differences(at) * (2.0 * planes.value_scale);
         }
         if is_in {
-            queue_amounts[slot] = vec4f(gradient, number);
+            queue_amounts[slot] = select(vec4f(0.0, 0.0, 0.0, NO_NUMBER), vec4f(gradient, number), is_there);
             if has_own_colors() {
                 queue_colors[slot] = stored_color(planes.colors, index_of(at));
             }
             let p = placed(at);
-            count_drawn(voxel, p, overlapped_sheets(p), false);
+            if is_there {
+                count_drawn(voxel, p, overlapped_sheets(p), false);
+            }
         }
     }
 }
@@ -150,7 +167,9 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
         is_added |= seen_count > 0u;
         for (var i = 0u; i < seen_count; i += lanes) {
             let slot = queue_first + base + nth_set_bit(seen, min(i + lane, seen_count - 1u));
-            var own = kernel_at(bitcast<vec4f>(queue_points[slot]), queue_amounts[slot], i + lane < seen_count);
+            let amount = queue_amounts[slot];
+            let is_there = i + lane < seen_count && (CHANNELS == 1u || amount.w != NO_NUMBER);
+            var own = kernel_at(bitcast<vec4f>(queue_points[slot]), amount, is_there);
             if OWN_COLORS {
                 own.color = queue_colors[select(0u, slot, has_own_colors())];
             }

@@ -21,7 +21,7 @@
 @group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
 @group(0) @binding(2) var<uniform> patch_range: PatchRange;
 @group(0) @binding(3) var<storage, read> bricks: array<Brick>;
-// For every layer, patch and sheet group the place of its first brick in this list; behind all of these the indices of bricks.
+// For every patch and sheet group the place of its first brick in this list; behind all of these the indices of bricks.
 @group(0) @binding(4) var<storage, read> bins: array<u32>;
 // The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
 @group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
@@ -169,12 +169,12 @@ fn draw_queue(corner: vec2u, threads: vec2u, thread: u32, is_last: bool, progres
     }
 }
 
-// Draws a layer of the group: finds and shades voxels and adds their sections, once for every filling of the queue.
-fn draw_layer(corner: vec2u, threads: vec2u, thread: u32, is_kept: bool) -> GroupOutcome {
+// Draws a layer of the group: finds voxels, shades those of the queue from the `first`-th on, and adds their sections, once for every filling of the queue.
+fn draw_layer(corner: vec2u, threads: vec2u, thread: u32, first: u32, is_kept: bool) -> GroupOutcome {
     let search = search_bounds(is_kept);
     var progress = Progress(open, shallow, 0u);
     var outcome = GroupOutcome(true, draws_all_groups());
-    var first_new = queue_count;
+    var first_new = first;
     loop {
         passes += PASSES_PER_FILL;
         find_voxels(search, is_kept);
@@ -223,40 +223,35 @@ fn finish(at: u32, reached: u32) {
     }
 }
 
-// Draws a group's layers, given by its patch and its place in compositing order.
+// Draws a group's layers, given by its patch and its place in compositing order. Voxels are found once for all layers, if the queue has room for them.
 fn draw_group(corner: vec2u, threads: vec2u, thread: u32, place: vec2u, is_kept: bool) -> GroupOutcome {
+    if !is_kept {
+        queue_count = 0u;
+    }
+    keep_voxels();
+    let bin = place.x * gather.groups + place.y;
     var all = GroupOutcome(true, false);
     for (var layer = 0u; layer < layers(); layer += 1u) {
         begin_layer(layer);
-        // The queue holds voxels of one layer.
-        let is_kept_here = is_kept && layers() == 1u;
-        if !is_kept_here {
+        let is_found = layer > 0u && all.is_whole;
+        if layer > 0u && !is_found {
             queue_count = 0u;
         }
-        keep_voxels();
-        let bin = bin_of(layer, place.x) + place.y;
-        walk(bins[bin], bins[bin + 1u]);
-        let outcome = draw_layer(corner, threads, thread, is_kept_here);
+        if !is_found {
+            walk(bins[bin], bins[bin + 1u]);
+        }
+        // Voxels have amounts of their own in each layer.
+        let first = select(0u, queue_count, layers() == 1u);
+        let outcome = draw_layer(corner, threads, thread, first, is_kept && (layer == 0u || is_found));
         all = GroupOutcome(all.is_whole && outcome.is_whole, all.has_drawn || outcome.has_drawn);
     }
     return all;
 }
 
-// The first bin of a layer of a patch.
-fn bin_of(layer: u32, patch_number: u32) -> u32 {
-    let side = vec2u(PATCH_WIDTH, PATCH_HEIGHT);
-    let patches = (frame.size + side - 1u) / side;
-    return (layer * patches.x * patches.y + patch_number) * gather.groups;
-}
-
-// The number of bricks that some groups of a patch visit, in all layers.
+// The number of bricks that some groups of a patch visit.
 fn brick_count(patch_number: u32, first: u32, end: u32) -> u32 {
-    var count = 0u;
-    for (var layer = 0u; layer < layers(); layer += 1u) {
-        let bin = bin_of(layer, patch_number);
-        count += bins[bin + end] - bins[bin + first];
-    }
-    return count;
+    let bin = patch_number * gather.groups;
+    return bins[bin + end] - bins[bin + first];
 }
 
 // Draws a patch's groups in compositing order, from where the previous dispatch stopped, until all pixels are opaque.

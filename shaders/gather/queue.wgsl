@@ -1,8 +1,11 @@
 // The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once, and kept for as long as their kernels reach
 // into the next sheet group. They are in workgroup memory, of which every subgroup has its own part.
 //
+// Needs gather.wgsl: current_layer, layers.
 // Needs gather/bits.wgsl: ballot, bits_from.
 // Needs gather/patch.wgsl: BATCH, THREADS, lane, lanes, passes.
+// Needs gather_planes.wgsl: current_layer, layers.
+// Needs shared/brick.wgsl: layer_bit.
 
 // The number of voxels in all parts; a multiple of 32.
 override QUEUE: u32 = 96u;
@@ -13,7 +16,7 @@ var<workgroup> queue_amounts: array<vec4f, QUEUE>;
 // The colours of voxels' own, if they count.
 override QUEUE_COLORS: u32 = 1u;
 var<workgroup> queue_colors: array<vec4f, QUEUE_COLORS>;
-// A mask of the blocks to whose pixels the voxel is drawn; see also `WHOLE_SHIFT`.
+// A mask of the blocks to whose pixels the voxel is drawn; see also `WHOLE_SHIFT`. Where there are several layers, it has the voxel's from bit 16 on.
 var<workgroup> queue_blocks: array<u32, QUEUE>;
 
 // The start of the subgroup's part.
@@ -44,9 +47,15 @@ fn enqueue(is_in: bool, voxel: u32, point: vec4f, blocks: u32) -> u32 {
     return slot;
 }
 
-// Whether there is an n-th voxel that some of the given blocks see.
+// Whether there is an n-th voxel of the current layer that some of the given blocks see.
 fn is_queued_for(blocks: u32, n: u32) -> bool {
-    return n < queue_count && (queue_blocks[queue_first + min(n, queue_count - 1u)] & blocks) != 0u;
+    let word = queue_blocks[queue_first + min(n, queue_count - 1u)];
+    return n < queue_count && (word & blocks) != 0u && is_of_layer(word);
+}
+
+// Whether a voxel is of the current layer, given its mask of blocks.
+fn is_of_layer(blocks: u32) -> bool {
+    return layers() == 1u || (blocks & layer_bit(current_layer())) != 0u;
 }
 
 // A mask of the voxels, among `BATCH` of the queue from `first` on, that any of the given blocks sees.

@@ -1,20 +1,21 @@
 // The slabs between planes at a thread's pixels: classified, shaded and composited (SPEC §9).
 //
-// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PATCH_THREADS, PERSPECTIVE, SHEETS, acc, control_points, cut, gather, passes, sheet_group.
-// Needs gather/pixels.wgsl: Pixels.
+// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PATCH_THREADS, PERSPECTIVE, SHEETS, THREADS, acc, cut, gather, passes, sheet_group.
+// Needs gather/pixels.wgsl: Pixels, halves_of.
 // Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, colors_of, fields_of.
 // Needs gather_planes.wgsl: carried, is_last_layer.
 // Needs shared/cells.wgsl: nearest_voxel, voxel_at.
 // Needs shared/channels.wgsl: CHANNELS.
-// Needs shared/cut.wgsl: FAR, place_of, sheet_depths, shown_depths.
+// Needs shared/cut.wgsl: FAR, noted, place_of, sheet_depths, shown_depths.
 // Needs shared/frame.wgsl: AVERAGE, SURFACE, frame.
 // Needs shared/means.wgsl: both, in_box, is_by_means.
 // Needs shared/planes.wgsl: NO_NUMBER.
 // Needs shared/project.wgsl: slope_of.
 // Needs shared/ramps.wgsl: LABELS.
-// Needs shared/seen.wgsl: OWN_COLORS, ramps_at, seen_channel.
+// Needs shared/seen.wgsl: OWN_COLORS, table_at.
 // Needs shared/shading.wgsl: lighting.
 // Needs shared/slab.wgsl: Composited, NOTHING_CARRIED, NO_SAMPLE, Slab, carried_by, carried_color, carried_sample, carry, carry_color, choose, composite_sheet, find_surface, is_drawn, part_of, sheet_of, slab_between, with_sample.
+// Needs shared/slab_integral.wgsl: Table.
 // Needs shared/texels.wgsl: index_of.
 // Needs shared/volume.wgsl: HOLES, is_hole, stored_at.
 
@@ -42,12 +43,17 @@ fn find_stretches(column: f32, rows: vec4f) {
     }
 }
 
-// A mask of the halves of blocks in which the plane that was handed on has values of some layer.
+// Masks of the halves of blocks in which the plane that the previous group handed on, or that this one hands on, has values of some layer.
+var<private> halves_handed_here: u32;
 var<private> halves_handed_on: u32;
 
-// The sheets of a group's slabs at all of a patch's pixels, added up over layers.
+// A mask of the halves of blocks in which a layer of the group has been drawn.
+var<private> halves_with_sheets: u32;
+
+// The sheets of a group's slabs at all of a patch's pixels, added up over layers; and which of a thread's there are, 16 bits for each of its rounds.
 override LAYER_SHEETS: u32 = 1u;
 var<workgroup> layer_sheets: array<vec4f, LAYER_SHEETS>;
+var<private> sheets_of_layers: vec4u;
 
 fn sample_of(fields: Fields, i: u32) -> vec4f {
     let sample = vec4f(fields.number[i], fields.x[i], fields.y[i], fields.z[i]);
@@ -55,8 +61,8 @@ fn sample_of(fields: Fields, i: u32) -> vec4f {
 }
 
 // Whether the values in a slab reach some that have an opacity; for `surface` of one half.
-fn has_opacity(slab: Slab, ramps: vec4u) -> bool {
-    let head = control_points[ramps.w];
+fn has_opacity(slab: Slab, table: Table) -> bool {
+    let head = table.head;
     return max(slab.first.x, slab.last.x) >= head.z && min(slab.first.x, slab.last.x) <= head.w;
 }
 
@@ -80,14 +86,12 @@ fn find_handed_on(pixels: Pixels) {
             is_any = is_any || (pixels.is_inside[i] && bitcast<f32>(held.x) != NO_NUMBER);
         }
     }
-    note_handed_on(pixels, is_any, true);
+    note_handed_on(pixels, is_any);
 }
 
-// Notes whether a thread's pixels have values on the plane that is handed on, in place of the noted ones or beside those of other layers.
-fn note_handed_on(pixels: Pixels, is_any: bool, is_first: bool) {
-    let half = 1u << pixels.thread / 4u;
-    let noted = select(halves_handed_on, halves_handed_on & ~subgroupOr(half), is_first);
-    halves_handed_on = noted | subgroupOr(select(0u, half, is_any));
+// Notes whether a thread's pixels have values on the plane that is handed on.
+fn note_handed_on(pixels: Pixels, is_any: bool) {
+    halves_handed_on |= subgroupOr(select(0u, 1u << pixels.thread / 4u, is_any));
 }
 
 // Removes a plane's values where the nearest voxel is a hole.
@@ -210,7 +214,7 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
                 }
             }
             if !is_by_means() {
-                let added = composite_layer(sheet, part, now.image, (j * 4u + i) * PATCH_THREADS + pixels.thread);
+                let added = composite_layer(sheet, part, now.image, pixels.thread, j * 4u + i);
                 now = Composited(added.image, now.carried, now.carried_color, added.hit, added.is_changed);
             }
             result = with_color(result, i, now.image);
@@ -229,7 +233,8 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
             carry_color(carried_slot(pixels, i), carried_pixels(), color_of_pixel(held_colors, i));
         }
     }
-    note_handed_on(pixels, is_handed_on, seen_channel.number == 0u);
+    note_handed_on(pixels, is_handed_on);
+    halves_with_sheets |= halves_of(pixels.thread);
     return transpose(result);
 }
 
@@ -250,7 +255,7 @@ fn may_show(slab: Slab, part: vec2f, image: vec4f) -> bool {
     let is_open = frame.culling == 0u || image.a < frame.opacity_threshold;
     let is_seen = part.x < part.y && is_drawn(slab.near + 0.5 * frame.slab_width);
     // Labels' tables differ from cell to cell.
-    let is_among = has_opacity(slab, ramps_at(slab.at, 0.5 * (part.x + part.y))) || (LABELS && COMPOSITING == SURFACE);
+    let is_among = has_opacity(slab, table_at(slab.at, 0.5 * (part.x + part.y))) || (LABELS && COMPOSITING == SURFACE);
     return is_open && is_seen && is_among;
 }
 
@@ -259,12 +264,22 @@ fn is_chosen_from() -> bool {
     return is_by_means() && COMPOSITING != SURFACE;
 }
 
-// Adds a layer's sheet to those of the layers before it, and composites the sum of all.
-fn composite_layer(sheet: vec4f, part: vec2f, image: vec4f, place: u32) -> Composited {
+// Adds a layer's sheet to those of the layers before it, and composites the sum of all. `slab` counts a thread's slabs and pixels.
+fn composite_layer(sheet: vec4f, part: vec2f, image: vec4f, thread: u32, slab: u32) -> Composited {
     var sum = sheet;
     if CHANNELS > 1u {
-        sum += select(layer_sheets[place], vec4f(0.0), seen_channel.number == 0u);
-        layer_sheets[place] = sum;
+        let place = slab * PATCH_THREADS + thread;
+        let round = thread / THREADS;
+        let bit = select(vec4u(0u), vec4u(1u << (slab + 16u * (round % 2u))), vec4u(round / 2u) == PIXELS);
+        let is_added = sheet.a > 0.0;
+        let is_after_others = any((sheets_of_layers & bit) != vec4u(0u));
+        for (var is_read = is_after_others && (is_added || is_last_layer()); is_read; is_read = false) {
+            sum += layer_sheets[place];
+        }
+        for (var is_kept = is_added && !is_last_layer(); is_kept; is_kept = false) {
+            layer_sheets[place] = sum;
+        }
+        sheets_of_layers |= select(vec4u(0u), bit, is_added);
     }
     var composited = Composited(image, vec4u(), vec4f(), FAR, false);
     for (var is_due = is_last_layer() && sum.a > 0.0; is_due; is_due = false) {

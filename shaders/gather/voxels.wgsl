@@ -1,14 +1,15 @@
 // The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of the previous ones stay, which are added, their shading, and
 // their counts.
 //
-// Needs gather.wgsl: FIRST_PLANE.
+// Needs gather.wgsl: FIRST_PLANE, current_layer, layers.
 // Needs gather/amounts.wgsl: overlapped_sheets, placed, screen_box, sections_here.
 // Needs gather/economies.wgsl: ECONOMIES.
 // Needs gather/patch.wgsl: ORDER, PARALLELOGRAM, PASSES_PER_FIND, PERSPECTIVE, SHEETS, drawn, first_px, gather, gathered, lane, lanes, open, passes, sheet_group.
-// Needs gather/queue.wgsl: QUEUE_COLORS, enqueue, queue_amounts, queue_colors, queue_count, queue_first, queue_points, queue_size.
+// Needs gather/queue.wgsl: QUEUE_COLORS, enqueue, queue_amounts, queue_blocks, queue_colors, queue_count, queue_first, queue_points, queue_size.
 // Needs gather/region.wgsl: blocks_in_box, blocks_in_parallelogram, bounds_of.
 // Needs gather/walk.wgsl: Found, SearchBounds, next_voxels.
-// Needs gather_planes.wgsl: ECONOMIES, FIRST_PLANE, overlapped_sheets, placed, screen_box, sections_here.
+// Needs gather_planes.wgsl: ECONOMIES, FIRST_PLANE, current_layer, layers, overlapped_sheets, placed, screen_box, sections_here.
+// Needs shared/brick.wgsl: LAYER_BITS.
 // Needs shared/frame.wgsl: BOX_SLACK, FRONT_TO_BACK, frame.
 
 // A group of sheets: its number, its first sheet, the depth where that begins, and half the box around its footprints.
@@ -87,21 +88,30 @@ fn keep_voxels() {
         passes += 1u;
         let slot = queue_first + min(i + lane, count - 1u);
         let point = queue_points[slot];
+        let layers_in = layers_in_queue(slot);
         let amount = queue_amounts[slot];
         let color = queue_colors[min(slot, QUEUE_COLORS - 1u)];
         let p = vec4f(bitcast<vec3f>(point.xyz), 1.0);
         let sheets = overlapped_sheets(p);
         let is_in = i + lane < count && is_drawn_here(p, sheets);
         subgroupBarrier();
-        let kept_slot = enqueue(is_in, point.w, p, blocks_here(p));
+        let kept_slot = enqueue(is_in, point.w, p, blocks_here(p) | layers_in);
         if is_in {
             queue_amounts[kept_slot] = amount;
             if QUEUE_COLORS > 1u {
                 queue_colors[kept_slot] = color;
             }
-            count_drawn(point.w, p, sheets, false);
+            // Where there are several layers, shading counts it in each.
+            if layers() == 1u {
+                count_drawn(point.w, p, sheets, false);
+            }
         }
     }
+}
+
+// The bits of the layers of a voxel in the queue, if there are several.
+fn layers_in_queue(slot: u32) -> u32 {
+    return select(0u, queue_blocks[slot] & LAYER_BITS, layers() > 1u);
 }
 
 // Fills the queue with voxels: all that reach into the group, or those that start in it.
@@ -116,7 +126,8 @@ fn find_voxels(search: SearchBounds, is_start: bool) {
         let p = placed(found.at);
         let sheets = overlapped_sheets(p);
         let may_be_new = !is_start || first_group(sheets) == f32(sheet_group.number);
-        _ = enqueue(lane < count && is_drawn_here(p, sheets) && may_be_new, found.voxel, p, blocks_here(p));
+        let blocks = blocks_here(p) | select(0u, found.in_layers, layers() > 1u);
+        _ = enqueue(lane < count && is_drawn_here(p, sheets) && may_be_new, found.voxel, p, blocks);
     }
 }
 
@@ -131,12 +142,12 @@ fn blocks_here(p: vec4f) -> u32 {
     return blocks_seen(open, screen_box(p), extent_here(p));
 }
 
-// Counts a voxel that is drawn into the group, and its sections there, unless another patch has counted it. A voxel drawn whole counts as one
+// Counts a voxel that is drawn into the group in the current layer, and its sections there, unless another patch has counted it. A voxel drawn whole counts as one
 // section.
 fn count_drawn(voxel: u32, p: vec4f, sheets: vec2f, is_whole: bool) {
     // The group's index among those that the kernel reaches, counted from the nearest; a whole kernel is drawn once.
     let nth = select(sheet_group.number - u32(max(sheets.x, 0.0)) / SHEETS, 0u, is_whole);
-    let word = nth * gather.bricks * 2u + voxel / 32u;
+    let word = (nth * layers() + current_layer()) * gather.bricks * 2u + voxel / 32u;
     let bit = 1u << (voxel % 32u);
     if (atomicOr(&gathered.words[gather.drawn + word], bit) & bit) != 0u {
         return;

@@ -1,11 +1,12 @@
 // The walk through a sheet group's bricks behind a patch, which finds the voxels whose kernels may reach the group and open pixels, one per lane at
 // a time.
 //
+// Needs gather.wgsl: layers.
 // Needs gather/amounts.wgsl: is_searched_in_perspective.
 // Needs gather/bits.wgsl: ballot, nth_set_bit, together.
 // Needs gather/patch.wgsl: PERSPECTIVE, bins, bricks, bricks_visited, lane, lanes, passes.
-// Needs gather_planes.wgsl: is_searched_in_perspective.
-// Needs shared/brick.wgsl: BRICK_VOXELS, in_brick.
+// Needs gather_planes.wgsl: is_searched_in_perspective, layers.
+// Needs shared/brick.wgsl: BRICK_VOXELS, in_brick, layers_of.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/project.wgsl: homogeneous.
 
@@ -32,8 +33,10 @@ struct Walk {
     fetched: u32,
     fetched_corner: vec3u,
     fetched_present: vec2u,
-    // The visited brick, its voxels that match the search, and the number of those that have been found.
+    fetched_layers: u32,
+    // The visited brick, a mask of its layers, its voxels that match the search, and the number of those that have been found.
     brick: u32,
+    in_layers: u32,
     corner: vec3u,
     matching_voxels: vec2u,
     matching_count: u32,
@@ -61,6 +64,7 @@ fn fetch_bricks(search: SearchBounds) {
     let record = bricks[walk_state.fetched];
     walk_state.fetched_corner = vec3u(record.x, record.y, record.z) & vec3u(~3u);
     walk_state.fetched_present = record.present;
+    walk_state.fetched_layers = layers_of(record);
     var may_hold = walk_state.next + lane < walk_state.end;
     if !PERSPECTIVE {
         let middle = homogeneous(vec4f(vec3f(walk_state.fetched_corner) + 1.5, 1.0)).xyz;
@@ -80,6 +84,9 @@ fn visit_brick(search: SearchBounds) {
     walk_state.brick = subgroupShuffle(walk_state.fetched, next);
     walk_state.corner = subgroupShuffle(walk_state.fetched_corner, next);
     let present = subgroupShuffle(walk_state.fetched_present, next);
+    if layers() > 1u {
+        walk_state.in_layers = subgroupShuffle(walk_state.fetched_layers, next);
+    }
     bricks_visited += 1u;
 
     // Every lane tests a run of the brick's slots, two at a time.
@@ -107,6 +114,8 @@ struct Found {
     // Brick and slot, as in the queue.
     voxel: u32,
     at: vec3u,
+    // As `layers_of` tells them.
+    in_layers: u32,
 }
 
 // Finds a voxel for each lane, as long as there are any. Returns their number.
@@ -129,7 +138,7 @@ fn next_voxels(search: SearchBounds, found: ptr<function, Found>) -> u32 {
         let nth = lane - count;
         let place = nth_set_bit(walk_state.matching_voxels, (nth + walk_state.found_count) % BRICK_VOXELS);
         if lane >= count && nth < walk_state.matching_count - walk_state.found_count {
-            *found = Found(walk_state.brick * BRICK_VOXELS + place, walk_state.corner + in_brick(place));
+            *found = Found(walk_state.brick * BRICK_VOXELS + place, walk_state.corner + in_brick(place), walk_state.in_layers);
         }
         let taken = min(walk_state.matching_count - walk_state.found_count, lanes - count);
         count += taken;

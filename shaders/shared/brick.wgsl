@@ -79,6 +79,18 @@ fn voxel_of(brick: Brick, slot: u32) -> vec3u {
     return origin + in_brick(slot);
 }
 
+// A mask of the layers that a brick is of, from bit 16 on.
+fn layers_of(brick: Brick) -> u32 {
+    return brick.extent & LAYER_BITS;
+}
+
+const LAYER_BITS = 0xffff0000u;
+
+// The bit of a layer in it.
+fn layer_bit(layer: u32) -> u32 {
+    return 1u << (16u + layer);
+}
+
 fn in_brick(slot: u32) -> vec3u {
     return vec3u(slot & 3u, (slot >> 2u) & 3u, slot >> 4u);
 }

@@ -16,29 +16,28 @@ fn opacity_in(cell: vec4f, x: f32) -> f32 {
 }
 
 // Whether the point at this share of the way, whose number is in a cell, is at least half opaque. `alpha` is a factor of its opacity.
-fn is_half_opaque(cell: vec4f, x: f32, near: vec4f, far: vec4f, alpha: f32, share: f32, ramps: vec4u) -> bool {
+fn is_half_opaque(cell: vec4f, x: f32, near: vec4f, far: vec4f, alpha: f32, share: f32, table: Table) -> bool {
     let opacity = opacity_in(cell, x) * alpha;
-    return opacity >= 0.5 && opacity * gradient_opacity(ramps, gradient_between(near, far, share)) >= 0.5;
+    return opacity >= 0.5 && opacity * gradient_opacity(table, gradient_between(near, far, share)) >= 0.5;
 }
 
-// The share of the way from one sample to the other at which the surface is, if it is between two shares and one set of ramps applies there. `alpha` is
+// The share of the way from one sample to the other at which the surface is, if it is between two shares and one transfer function applies there. `alpha` is
 // a factor of opacities.
-fn surface_between(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, ramps: vec4u) -> f32 {
-    let table = ramps.w;
-    let head = control_points[table];
-    let domain = control_points[table + 1u];
+fn surface_between(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, table: Table) -> f32 {
+    let head = table.head;
+    let domain = table.domain;
     let first = clamp(mix(near.x, far.x, start), domain.x, domain.z);
     let last = clamp(mix(near.x, far.x, end), domain.x, domain.z);
     // For `surface` the table's head holds the range of numbers that are at least half opaque.
     if max(first, last) < head.z || min(first, last) > head.w {
         return NO_SURFACE;
     }
-    let cells = table + 2u + u32(head.y);
-    let samples = select(SAMPLES, 1u, ramps.w - ramps.z <= 1u);
+    let cells = cells_of(table);
+    let samples = select(SAMPLES, 1u, table.ramps.w - table.ramps.z <= 1u);
     let size = last - first;
     let is_rising = size >= 0.0;
-    let last_cell = cell_of(table, head.y, domain, last);
-    for (var at = cell_of(table, head.y, domain, first); ; at = select(at - 1u, at + 1u, is_rising)) {
+    let last_cell = cell_of(table, last);
+    for (var at = cell_of(table, first); ; at = select(at - 1u, at + 1u, is_rising)) {
         let cell = control_points[cells + CELL * at];
         let cell_end = control_points[cells + CELL * at + 1u].w;
         let enters = clamp(first, cell.x, cell_end);
@@ -49,11 +48,11 @@ fn surface_between(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, ra
             var below = 0.0;
             for (var i = 0u; i <= samples; i += 1u) {
                 var above = f32(i) / f32(samples);
-                if is_half_opaque(cell, mix(enters, leaves, above), near, far, alpha, mix(enter, leave, above), ramps) {
+                if is_half_opaque(cell, mix(enters, leaves, above), near, far, alpha, mix(enter, leave, above), table) {
                     for (var halving = 0u; halving < F32_HALVINGS; halving += 1u) {
                         let middle = 0.5 * (below + above);
                         let number = mix(enters, leaves, middle);
-                        if is_half_opaque(cell, number, near, far, alpha, mix(enter, leave, middle), ramps) {
+                        if is_half_opaque(cell, number, near, far, alpha, mix(enter, leave, middle), table) {
                             above = middle;
                         } else {
                             below = middle;
@@ -83,7 +82,7 @@ fn surface_in_cells(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, f
         // A border that rounding has not quite passed must not hold the ray up.
         let next = min(max(share + min(min(steps.x, steps.y), steps.z), share + 1e-6), end);
         let ramps = ramps_of(seen_channel.number, index_of(nearest_voxel(mix(first, last, 0.5 * (share + next)))));
-        let surface = surface_between(near, far, alpha, share, next, ramps);
+        let surface = surface_between(near, far, alpha, share, next, table_of(ramps));
         if surface != NO_SURFACE {
             return surface;
         }

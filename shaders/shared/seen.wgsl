@@ -18,11 +18,21 @@ struct SeenChannel {
 
 var<private> seen_channel: SeenChannel;
 
+// Its transfer function, where voxels have none of their own.
+var<private> seen_table: Table;
+
 // Makes a channel the one that is read and looked at.
 fn see_channel(channel: u32) {
     read_channel(channel);
     let scale = control_points[frame.channel_table + CHANNEL_ENTRIES * channel + 2u];
     seen_channel = SeenChannel(channel, scale.x, scale.y, u32(scale.z));
+}
+
+// Finds the transfer function of the channel that is looked at: read from memory once, instead of for every slab.
+fn see_table() {
+    if !LABELS {
+        seen_table = table_of(ramps_of(seen_channel.number, 0u));
+    }
 }
 
 // Whether voxels have colours of their own.
@@ -35,12 +45,12 @@ fn colored(given: vec3f, own: vec4f) -> vec4f {
     return select(vec4f(given, 1.0), own, has_own_colors());
 }
 
-// The ramps of the voxel whose cell holds the point of a pixel's ray at a sheet depth.
-fn ramps_at(at: vec3f, sheet_depth: f32) -> vec4u {
+// The transfer function of the voxel whose cell holds the point of a pixel's ray at a sheet depth.
+fn table_at(at: vec3f, sheet_depth: f32) -> Table {
     if !LABELS {
-        return ramps_of(seen_channel.number, 0u);
+        return seen_table;
     }
-    return ramps_of(seen_channel.number, index_of(nearest_voxel(voxel_at(at, sheet_depth))));
+    return table_of(ramps_of(seen_channel.number, index_of(nearest_voxel(voxel_at(at, sheet_depth)))));
 }
 
 // The amount per unit length (without a logarithm: the opacity) and the colour.
@@ -55,23 +65,23 @@ fn gradient_between(near: vec4f, far: vec4f, share: f32) -> Gradient {
 }
 
 // The opacity of a gradient.
-fn gradient_opacity(ramps: vec4u, gradient: Gradient) -> f32 {
+fn gradient_opacity(table: Table, gradient: Gradient) -> f32 {
     // Without gradient opacity the ramp is a single point. (A loop is left out where no thread needs it.)
-    var opacity = control_points[ramps.z].y;
-    for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
-        opacity = ramp(ramps.z, ramps.w, gradient.magnitude).x;
+    var opacity = table.first_graded;
+    for (var is_graded = table.ramps.w > table.ramps.z + 1u; is_graded; is_graded = false) {
+        opacity = ramp(table.ramps.z, table.ramps.w, gradient.magnitude).x;
     }
     return opacity;
 }
 
 // The shaded means over the values between two samples, each a number and its gradient, from the nearer to the farther one. `own` is the colour of the
 // voxels' own there.
-fn look(near: vec4f, far: vec4f, own: vec4f, ramps: vec4u, light: Lighting) -> Look {
-    let means = slab_integral(ramps.w, near.x, far.x);
+fn look(near: vec4f, far: vec4f, own: vec4f, table: Table, light: Lighting) -> Look {
+    let means = slab_integral(table, near.x, far.x);
     if means.amount <= 0.0 {
         return Look(0.0, vec3f(0.0));
     }
     let gradient = gradient_between(near, far, means.share);
     let color = colored(means.color, own);
-    return Look(means.amount * color.a * gradient_opacity(ramps, gradient), shade(color.rgb, gradient, light));
+    return Look(means.amount * color.a * gradient_opacity(table, gradient), shade(color.rgb, gradient, light));
 }

@@ -125,7 +125,7 @@ fn part_of(ray: vec2f, near: f32, far: f32) -> vec2f {
 fn sheet_of(slab: Slab, light: Lighting) -> vec4f {
     let part = part_of(slab.ray, slab.near, slab.far);
     let share = select(0.0, shown_share(slab.ray, slab.near), is_drawn(0.5 * (slab.near + slab.far)));
-    let seen = look(slab.first, slab.last, slab.own, ramps_at(slab.at, 0.5 * (part.x + part.y)), light);
+    let seen = look(slab.first, slab.last, slab.own, table_at(slab.at, 0.5 * (part.x + part.y)), light);
     return vec4f(seen.color, 1.0) * (seen.amount * share * frame.slab_width * slab.per_depth);
 }
 
@@ -152,16 +152,16 @@ fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
             let first = voxel_at(slab.at, slab.near);
             share = surface_in_cells(slab.first, slab.last, alpha, start, end, first, voxel_at(slab.at, slab.far));
         } else {
-            share = surface_between(slab.first, slab.last, alpha, start, end, ramps_of(seen_channel.number, 0u));
+            share = surface_between(slab.first, slab.last, alpha, start, end, seen_table);
         }
     }
     if share == NO_SURFACE {
         return Composited(image, vec4u(), vec4f(), FAR, false);
     }
     let sheet_depth = slab.near + share * frame.slab_width;
-    let ramps = ramps_at(slab.at, sheet_depth);
+    let table = table_at(slab.at, sheet_depth);
     let gradient = gradient_between(slab.first, slab.last, share);
-    let color = colored(color_at(ramps.w, mix(slab.first.x, slab.last.x, share)), slab.own);
+    let color = colored(color_at(table, mix(slab.first.x, slab.last.x, share)), slab.own);
     return Composited(vec4f(shade(color.rgb, gradient, light), 1.0), vec4u(), vec4f(), sheet_depth, true);
 }
 
@@ -212,14 +212,14 @@ fn choose(slab: Slab, image: vec4f, before: vec4u, color_before: vec4f, light: L
     if !is_chosen {
         return Composited(image, carried, carried_color, FAR, false);
     }
-    let ramps = ramps_at(slab.at, sheet_depth);
+    let table = table_at(slab.at, sheet_depth);
     var seen = Look();
     if COMPOSITING == AVERAGE {
-        let mean = slab_integral(ramps.w, point.x, point.x);
+        let mean = slab_integral(table, point.x, point.x);
         let color = colored(mean.color, own);
         seen = Look(mean.amount * color.a, color.rgb);
     } else {
-        seen = look(point, point, own, ramps, light);
+        seen = look(point, point, own, table, light);
     }
     let alpha = min(seen.amount, 1.0);
     let is_hit = alpha >= cut.first_hit;

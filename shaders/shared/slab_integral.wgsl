@@ -18,11 +18,29 @@ const SUM = 2u;
 // The distance of the two Gauss nodes of an interval from its middle, in lengths of the interval.
 const NODE = 0.28867513;
 
+// A transfer function: its ramps as `ramps_of` tells them, of which the last entry is where its table starts; the table's first two entries; and the
+// opacity of the first control point for gradients.
+struct Table {
+    ramps: vec4u,
+    head: vec4f,
+    domain: vec4f,
+    first_graded: f32,
+}
+
+fn table_of(ramps: vec4u) -> Table {
+    return Table(ramps, control_points[ramps.w], control_points[ramps.w + 1u], control_points[ramps.z].y);
+}
+
+// The first entry of a table's cells.
+fn cells_of(table: Table) -> u32 {
+    return table.ramps.w + 2u + u32(table.head.y);
+}
+
 // The cell that a number lies in.
-fn cell_of(table: u32, bins: f32, domain: vec4f, x: f32) -> u32 {
-    let bin = u32(clamp((x - domain.x) * domain.y, 0.0, bins - 1.0));
-    let ends = vec2u(control_points[table + 2u + bin].xy);
-    let cells = table + 2u + u32(bins);
+fn cell_of(table: Table, x: f32) -> u32 {
+    let bin = u32(clamp((x - table.domain.x) * table.domain.y, 0.0, table.head.y - 1.0));
+    let ends = vec2u(control_points[table.ramps.w + 2u + bin].xy);
+    let cells = cells_of(table);
     var first = ends.x;
     var last = ends.y;
     while first < last {
@@ -35,11 +53,9 @@ fn cell_of(table: u32, bins: f32, domain: vec4f, x: f32) -> u32 {
 }
 
 // The colour at a number.
-fn color_at(table: u32, x: f32) -> vec3f {
-    let head = control_points[table];
-    let domain = control_points[table + 1u];
-    let within = clamp(x, domain.x, domain.z);
-    let cell = table + 2u + u32(head.y) + CELL * cell_of(table, head.y, domain, within);
+fn color_at(table: Table, x: f32) -> vec3f {
+    let within = clamp(x, table.domain.x, table.domain.z);
+    let cell = cells_of(table) + CELL * cell_of(table, within);
     let start = control_points[cell];
     let along = clamp((within - start.x) * start.y, 0.0, 1.0);
     return control_points[cell + 1u].rgb + control_points[cell + 2u].rgb * along;
@@ -58,18 +74,18 @@ fn mean_of_part(cell: u32, low: f32, high: f32, origin: f32) -> array<vec4f, 2> 
     return array(vec4f(color * sum + rise * dot(m, u), sum), vec4f(dot(m, x - origin), 0.0, 0.0, 0.0));
 }
 
-// The means over the numbers from f0 to f1, by the table that starts at an entry of the control points.
-fn slab_integral(table: u32, f0: f32, f1: f32) -> SlabIntegral {
-    let head = control_points[table];
-    let domain = control_points[table + 1u];
+// The means over the numbers from f0 to f1.
+fn slab_integral(table: Table, f0: f32, f1: f32) -> SlabIntegral {
+    let head = table.head;
+    let domain = table.domain;
     let low = clamp(min(f0, f1), domain.x, domain.z);
     let high = clamp(max(f0, f1), domain.x, domain.z);
     if high < head.z || low > head.w {
         return SlabIntegral(0.0, 0.5, vec3f(0.0));
     }
-    let cells = table + 2u + u32(head.y);
-    let first = cell_of(table, head.y, domain, low);
-    let last = cell_of(table, head.y, domain, high);
+    let cells = cells_of(table);
+    let first = cell_of(table, low);
+    let last = cell_of(table, high);
     let size = high - low;
     let is_one = first == last;
     let near_end = select(control_points[cells + CELL * first + 1u].w, high, is_one);

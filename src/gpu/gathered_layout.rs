@@ -16,7 +16,7 @@ pub struct GatheredLayout {
     pub groups: u32,
     /// The number of bricks in the volume.
     pub bricks: u32,
-    /// Bits of the voxels that have been drawn: 64 bits per brick for each of the groups that one kernel can reach.
+    /// Bits of the voxels that have been drawn: 64 bits per brick for each of the groups that one kernel can reach, and in each of these for every layer.
     pub drawn: u32,
     /// Bits of the tiles that have been composited: one bit per 32×32 tile for every group.
     pub composited: u32,
@@ -33,10 +33,10 @@ const WORDS_BEFORE: u32 = (offset_of!(Gathered, words) / 4) as u32;
 const BINDING_WORDS: u32 = 64;
 
 impl GatheredLayout {
-    /// The layout for a view of a volume of `bricks` bricks.
-    pub fn new(view: &ViewGeometry, bins: &PatchBins, bricks: u32) -> Self {
+    /// The layout for a view of a volume of `bricks` bricks, whose values are gathered in `layers` layers.
+    pub fn new(view: &ViewGeometry, bins: &PatchBins, bricks: u32, layers: u32) -> Self {
         let drawn = bins.groups;
-        let composited = drawn + 2 * bricks * groups_per_kernel(view);
+        let composited = drawn + 2 * bricks * layers * groups_per_kernel(view);
         let [columns, rows] = tile_grid(view.size);
         let reached = composited + (columns * rows * bins.groups).div_ceil(32);
         let end = reached + bins.patches * patch_bins::HALVES;

@@ -4,6 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, UVec3};
 
+use crate::parallel::prelude::*;
 use crate::volume::Grid;
 
 /// The side of a brick in voxels.
@@ -24,7 +25,7 @@ pub struct Brick {
     pub y: u32,
     /// Least z.
     pub z: u32,
-    /// Greatest minus least x, y and z, in bytes 0, 1 and 2.
+    /// Greatest minus least x, y and z, two bits each; from bit 16 on, where lists were [joined], the lists that have the brick.
     pub extent: u32,
 }
 
@@ -133,8 +134,36 @@ pub fn origin(brick: &Brick) -> UVec3 {
 
 /// The box of a brick's voxels: its middle and half its size in voxels.
 pub fn bounds(brick: &Brick) -> (DVec3, DVec3) {
-    let half = UVec3::new(brick.extent & 0xff, brick.extent >> 8 & 0xff, brick.extent >> 16).as_dvec3() / 2.0;
+    let half = UVec3::new(brick.extent & 3, brick.extent >> 2 & 3, brick.extent >> 4 & 3).as_dvec3() / 2.0;
     (UVec3::new(brick.x, brick.y, brick.z).as_dvec3() + half, half)
+}
+
+/// The bricks of several lists, at most 16, as one list, each with the voxels of all, in memory order.
+pub fn joined(lists: &[&[Brick]]) -> Vec<Brick> {
+    let with_list = |(number, bricks): (usize, &&[Brick])| {
+        let list = 1_u32 << (16 + number);
+        bricks
+            .iter()
+            .filter(|brick| brick.present != [0; 2])
+            .map(move |brick| Brick { extent: list, ..*brick })
+            .collect()
+    };
+    let mut all: Vec<Brick> = lists.iter().enumerate().flat_map::<Vec<Brick>, _>(with_list).collect();
+    all.par_sort_by_key(position);
+    all.dedup_by(|other, brick| {
+        let is_same = position(other) == position(brick);
+        if is_same {
+            brick.present = [brick.present[0] | other.present[0], brick.present[1] | other.present[1]];
+            brick.extent |= other.extent;
+        }
+        is_same
+    });
+    all.par_iter_mut().for_each(|brick| {
+        let lists = brick.extent;
+        fit(brick);
+        brick.extent |= lists;
+    });
+    all
 }
 
 /// A key that sorts bricks in memory order, whatever the order in which they were added.
@@ -181,5 +210,5 @@ fn fit(brick: &mut Brick) {
     let origin = |at: u32, low: u32| at / SIDE * SIDE + low;
     let [(x, to_x), (y, to_y), (z, to_z)] = bounds;
     (brick.x, brick.y, brick.z) = (origin(brick.x, x), origin(brick.y, y), origin(brick.z, z));
-    brick.extent = (to_x - x) | (to_y - y) << 8 | (to_z - z) << 16;
+    brick.extent = (to_x - x) | (to_y - y) << 2 | (to_z - z) << 4;
 }

@@ -82,11 +82,13 @@ pub struct Work {
     pub search: u32,
     /// The number of threads in the smallest subgroups.
     pub threads: u32,
+    /// The number of layers in which values are gathered; 1 where colours are.
+    pub layers: u32,
 }
 
 impl Passes {
-    /// The passes of a view in which a workgroup draws `blocks` blocks of a patch in a number of layers; `values` states whether values are gathered.
-    pub fn new(Work { search, threads }: Work, blocks: u32, layers: u32, values: bool) -> Self {
+    /// The passes of a view in which a workgroup draws `blocks` blocks of a patch; `values` states whether values are gathered.
+    pub fn new(Work { search, threads, layers }: Work, blocks: u32, values: bool) -> Self {
         let (of_voxels, of_slabs) = match values {
             true => (
                 MAX_PASSES_OF_BRICK_OF_VALUES,
@@ -96,10 +98,13 @@ impl Passes {
         };
         let of_block = of_slabs.saturating_add(MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
         let per_group = layers.saturating_mul(blocks.saturating_mul(of_block).saturating_add(MAX_PASSES_OF_GROUP));
-        let per_brick = of_voxels + blocks * MAX_PASSES_OF_ADDITION;
+        // Where the queue cannot hold what is found for all layers, each finds its own.
+        let searches = if layers > 1 { 1 + layers } else { 1 };
+        let per_brick = of_voxels.saturating_mul(searches).saturating_add(layers * blocks * MAX_PASSES_OF_ADDITION);
         // Half as many threads take twice as many passes.
         let times = 8_u32.div_ceil(threads);
-        Self { most: MAX_PASSES, per_group: per_group.saturating_mul(times), per_brick: times * per_brick, search }
+        let of_all = |passes: u32| passes.saturating_mul(times);
+        Self { most: MAX_PASSES, per_group: of_all(per_group), per_brick: of_all(per_brick), search }
     }
 }
 
@@ -112,8 +117,8 @@ pub struct PatchBins {
     pub patches: u32,
     /// The number of sheet groups of every patch.
     pub groups: u32,
-    /// The start of every bin in this list: for every layer and every patch its groups, in compositing order; then the end of the last one, which is that of
-    /// the list. The bins themselves follow, indices of bricks.
+    /// The start of every bin in this list: for every patch its groups, in compositing order; then the end of the last one, which is that of the list. The
+    /// bins themselves follow, indices of bricks.
     pub words: Vec<u32>,
     /// The number of bins.
     pub bins: u32,
@@ -160,14 +165,13 @@ struct Pixels {
 }
 
 impl PatchBins {
-    /// Sorts the bricks of some layers by the patches and groups they may touch, with kernels of the radius `support`; layers' bricks are numbered one layer
-    /// after the other. With `planes` (SPEC §9) it is a brick's planes that count, and its footprints on them. The sheet depths `covered` belong to some
+    /// Sorts bricks by the patches and groups they may touch, with kernels of the radius `support`. With `planes` (SPEC §9) it is a brick's planes that count, and its footprints on them. The sheet depths `covered` belong to some
     /// group even if they are empty; groups without any of the slabs `drawn` are left out. The list may have `most_words` words.
     ///
     /// # Errors
     /// If there are more bricks in total, or behind a patch, than the rasterizer supports.
     pub fn new(
-        layers: &[&[Brick]],
+        bricks: &[Brick],
         (view, planes): (&ViewGeometry, Option<&PlaneGeometry>),
         order: Order,
         (covered, drawn): (Range<f64>, &Range<i32>),
@@ -178,27 +182,20 @@ impl PatchBins {
         let check = |what, required: u64, actual: u64| {
             if required <= actual { Ok(()) } else { Err(TileCapacityError { what, required, actual }) }
         };
-        let bricks: usize = layers.iter().map(|bricks| bricks.len()).sum();
-        check("bricks", bricks as u64, MAX_BRICKS as u64)?;
+        check("bricks", bricks.len() as u64, MAX_BRICKS as u64)?;
         let drawn = if drawn.is_empty() { 0..0 } else { SlabGrid::groups_of(drawn, SHEETS) };
         let within = |groups: Range<i32>| groups.start.max(drawn.start)..groups.end.min(drawn.end);
-        let mut first_number = 0;
-        let place = |bricks: &&[Brick]| {
-            let mut placed = place(bricks, first_number, view, planes);
-            first_number += bricks.len() as u32;
-            placed.iter_mut().for_each(|brick| brick.groups = within(brick.groups.clone()));
-            placed.retain(|brick| !brick.groups.is_empty());
-            placed
-        };
-        let placed: Vec<Vec<Placed>> = layers.iter().map(place).collect();
+        let mut placed = place(bricks, view, planes);
+        placed.iter_mut().for_each(|brick| brick.groups = within(brick.groups.clone()));
+        placed.retain(|brick| !brick.groups.is_empty());
         let group_planes = view.slabs.groups(SHEETS);
         let covered = group_planes.covered(covered).map(within).filter(|groups| !groups.is_empty());
-        let all = || placed.iter().flatten().map(|brick| &brick.groups).chain(&covered);
+        let all = || placed.iter().map(|brick| &brick.groups).chain(&covered);
         let first_group = all().map(|groups| groups.start).min().unwrap_or(0);
         let end_group = all().map(|groups| groups.end).max().unwrap_or(0);
         let groups = (end_group - first_group) as u32;
         let [columns, rows] = grid(view.size);
-        let bins = u64::from(columns) * u64::from(rows) * u64::from(groups) * layers.len() as u64;
+        let bins = u64::from(columns) * u64::from(rows) * u64::from(groups);
         check("patches times sheet groups", bins, most_words - 1)?;
 
         let half_boxes: Vec<DVec2> = (first_group..end_group)
@@ -213,28 +210,25 @@ impl PatchBins {
             .collect();
 
         let strip_rows = rows.div_ceil(STRIPS_PER_THREAD * parallel::current_num_threads() as u32).max(1);
-        let sort = |placed| Sort { placed, half_boxes: &half_boxes, order, first_group, size: view.size };
-        let strips = placed.iter().flat_map(|placed: &Vec<Placed>| {
-            let of_rows = move |first: u32| (sort(placed), first..(first + strip_rows).min(rows));
-            (0..rows).step_by(strip_rows as usize).map(of_rows)
-        });
-        let strips: Vec<_> = strips.collect();
-        let strips: Vec<_> = strips.into_par_iter().map(|(sort, rows)| (sort.counted(rows), sort)).collect();
-        let total: u64 = strips.iter().map(|(strip, _)| strip.entries).sum();
+        let sort = Sort { placed: &placed, half_boxes: &half_boxes, order, first_group, size: view.size };
+        let first_rows: Vec<u32> = (0..rows).step_by(strip_rows as usize).collect();
+        let counted = |first: u32| sort.counted(first..(first + strip_rows).min(rows));
+        let strips: Vec<Strip> = first_rows.into_par_iter().map(counted).collect();
+        let total: u64 = strips.iter().map(|strip| strip.entries).sum();
         check("bricks in patches and sheet groups", total, most_words - 1 - bins)?;
         let mut words = Vec::with_capacity((bins + 1 + total) as usize);
         let mut next = bins as u32 + 1;
-        for count in strips.iter().flat_map(|(strip, _)| &strip.counts) {
+        for count in strips.iter().flat_map(|strip| &strip.counts) {
             words.push(next);
             next += count;
         }
         words.push(next);
-        let entries: Vec<_> = strips.par_iter().map(|(strip, sort)| sort.sorted(strip)).collect();
+        let entries: Vec<_> = strips.par_iter().map(|strip| sort.sorted(strip)).collect();
         entries.into_iter().for_each(|entries| words.extend(entries));
         let starts = &words[..=bins as usize];
         let of_workgroups = |workgroups| {
-            let passes = Passes::new(work, BLOCKS / workgroups, layers.len() as u32, planes.is_some());
-            let dispatches = dispatches(starts, [layers.len(), groups as usize], &passes);
+            let passes = Passes::new(work, BLOCKS / workgroups, planes.is_some());
+            let dispatches = dispatches(starts, groups as usize, &passes);
             dispatches.map(|dispatches| (workgroups, passes, dispatches))
         };
         let (workgroups, passes, dispatches) = of_workgroups(1).or_else(|_| of_workgroups(BLOCKS))?;
@@ -348,8 +342,8 @@ impl Placed {
     }
 }
 
-/// The bricks in front of the eye, numbered from some number on, in memory order, so that equal scenes add up in equal order after any history of changes.
-fn place(bricks: &[Brick], first: u32, view: &ViewGeometry, planes: Option<&PlaneGeometry>) -> Vec<Placed> {
+/// The bricks in front of the eye in memory order, so that equal scenes add up in equal order after any history of changes.
+fn place(bricks: &[Brick], view: &ViewGeometry, planes: Option<&PlaneGeometry>) -> Vec<Placed> {
     let groups = view.slabs.groups(SHEETS);
     let mut placed: Vec<Placed> = (bricks.par_iter().enumerate())
         .filter(|(_, brick)| brick.present != [0; 2])
@@ -361,14 +355,14 @@ fn place(bricks: &[Brick], first: u32, view: &ViewGeometry, planes: Option<&Plan
             };
             let is_beyond_near = bounds.depths.start < bounds.depths.end;
             is_beyond_near.then(|| Placed {
-                number: first + number as u32,
+                number: number as u32,
                 low: bounds.low,
                 high: bounds.high,
                 groups: groups.touched(bounds.depths.start, bounds.depths.end),
             })
         })
         .collect();
-    let position = |placed: &Placed| brick::position(&bricks[(placed.number - first) as usize]);
+    let position = |placed: &Placed| brick::position(&bricks[placed.number as usize]);
     if !placed.is_sorted_by_key(position) {
         placed.par_sort_unstable_by_key(position);
     }
@@ -380,20 +374,20 @@ pub fn grid(size: [u32; 2]) -> [u32; 2] {
     [size[0].div_ceil(PATCH[0]), size[1].div_ceil(PATCH[1])]
 }
 
-/// A number of dispatches that suffices for every patch, given the numbers of layers and of groups: each processes groups until the next one might exceed
+/// A number of dispatches that suffices for every patch, given the number of groups: each processes groups until the next one might exceed
 /// the passes.
-fn dispatches(starts: &[u32], [layers, groups]: [usize; 2], passes: &Passes) -> Result<u32, TileCapacityError> {
+fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, TileCapacityError> {
     let most = u64::from(passes.most);
     if passes.per_group >= passes.most {
         let what = "passes through loops in one sheet group";
         return Err(TileCapacityError { what, required: passes.per_group.into(), actual: most });
     }
-    let patches = (starts.len() - 1) / (layers * groups.max(1));
+    let patches = (starts.len() - 1) / groups.max(1);
     let of_patch = |patch: usize| {
         let (mut dispatches, mut taken) = (1, 0);
         for group in 0..groups {
-            let bin = |layer: usize| (layer * patches + patch) * groups + group;
-            let bricks: u32 = (0..layers).map(|layer| starts[bin(layer) + 1] - starts[bin(layer)]).sum();
+            let bin = patch * groups + group;
+            let bricks = starts[bin + 1] - starts[bin];
             let needed = u64::from(passes.per_group) + u64::from(bricks) * u64::from(passes.per_brick);
             if taken + needed > most && taken > 0 {
                 (dispatches, taken) = (dispatches + 1, 0);

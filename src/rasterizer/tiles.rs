@@ -18,6 +18,7 @@ use crate::gpu::layout::{Brick, FieldPlanes, Gather as GatherUniform, PatchRange
 use crate::gpu::targets::BandBuffer;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
+use crate::lists::brick;
 use crate::lists::patch_bins::{self, PatchBins, SHEETS, Work};
 use crate::pass::gather::{
     Gather, GatherBand, GatherBuffers, GatherMode, GatheredPlanes, MOST_LAYERS, PlaneMode, drawn_order,
@@ -49,6 +50,8 @@ pub(crate) struct TileFrame {
 #[derive(Debug)]
 struct Binned {
     bins: PatchBins,
+    /// [`joined`].
+    joined: Vec<Brick>,
     view: ViewGeometry,
     order: Order,
     /// The planes on which values are gathered (SPEC §9).
@@ -81,11 +84,12 @@ impl TileRasterizer {
         let layers: Vec<&[Brick]> = inputs.lists().iter().map(BrickLists::all).collect();
         let are_joined = !matches!(inputs.lists(), [only] if only.lists.len() == 1);
         let (binned, is_new) = Binned::renewed(&limits, inputs, &layers, old_binned)?;
-        let results = GatheredLayout::new(&request.view, &binned.bins, count(&layers));
+        let bricks = binned.bricks(&layers);
+        let results = GatheredLayout::new(&request.view, &binned.bins, bricks.len() as u32, layer_count(request));
         let spec = TileBuffers::specs(&limits, request, (&binned.bins, &results), are_joined)?;
         let (range_bytes, dispatches) = patch_ranges(&limits, request);
         let contents = (&binned.bins, &results, &range_bytes[..]);
-        let buffers = TileBuffers::filled(inputs, spec, contents, &layers, (old_buffers, is_new))?;
+        let buffers = TileBuffers::filled(inputs, spec, contents, bricks, (old_buffers, is_new))?;
         let coefficients = match request.after.as_ref().and_then(|after| after.needs.coefficients.as_ref()) {
             Some(exact) => Some(exact[request.layer.channels.start].texture(device, queue)?),
             None => None,
@@ -145,8 +149,10 @@ impl TileRasterizer {
         (layers, lists): (&[&[Brick]], usize),
         by_label: bool,
     ) -> Result<FrameEstimate, RenderError> {
-        let bins = bins(limits, request, layers, all_search_passes(request, by_label))?;
-        let results = GatheredLayout::new(&request.view, &bins, count(layers));
+        let joined = joined(layers);
+        let bricks = all_bricks(layers, &joined);
+        let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
+        let results = GatheredLayout::new(&request.view, &bins, bricks.len() as u32, layer_count(request));
         let are_joined = layers.len() != 1 || lists != 1;
         let mut buffers: Vec<BufferSpec> =
             TileBuffers::specs(limits, request, (&bins, &results), are_joined)?.all().collect();
@@ -224,11 +230,14 @@ impl Binned {
                 && (old.support, &old.covered, old.planes) == (kernel.support(), covered, planes)
                 && old.drawn == drawn(request)
         };
-        if let Some(old) = old.filter(is_current) {
-            return Ok((old, false));
-        }
+        let joined = match old {
+            Some(old) if is_current(&old) => return Ok((old, false)),
+            Some(old) if old.revision == volume.revision => old.joined,
+            _ => joined(layers),
+        };
         let binned = Self {
-            bins: bins(limits, request, layers, search)?,
+            bins: bins(limits, request, all_bricks(layers, &joined), search)?,
+            joined,
             view: *view,
             order,
             planes,
@@ -239,6 +248,26 @@ impl Binned {
         };
         Ok((binned, true))
     }
+
+    /// The bricks of all layers.
+    fn bricks<'a>(&'a self, layers: &[&'a [Brick]]) -> &'a [Brick] {
+        all_bricks(layers, &self.joined)
+    }
+}
+
+/// The bricks of several layers as one list; empty if there is one layer.
+fn joined(layers: &[&[Brick]]) -> Vec<Brick> {
+    if layers.len() == 1 { Vec::new() } else { brick::joined(layers) }
+}
+
+/// The bricks of all layers, given those of several [joined](joined).
+fn all_bricks<'a>(layers: &[&'a [Brick]], joined: &'a [Brick]) -> &'a [Brick] {
+    if let [only] = layers { only } else { joined }
+}
+
+/// The number of layers of sums: one for each channel whose values are gathered, one for all whose colours are.
+fn layer_count(request: &FrameRequest) -> u32 {
+    if request.after.is_some() { request.stored.len() as u32 } else { 1 }
 }
 
 /// A frame's buffers, except those of bands: their specs, or the buffers themselves.
@@ -251,7 +280,7 @@ struct TileBuffers<B> {
     bins: B,
     gathered: B,
     half_boxes: B,
-    /// All bricks in one buffer, one layer after the other, if the volume's own are in several, or in none.
+    /// All bricks in one buffer, if the volume's own are in several, or in none.
     bricks: Option<B>,
 }
 
@@ -274,7 +303,7 @@ impl TileBuffers<Buffer> {
         inputs: FrameInputs<'_>,
         spec: TileBuffers<BufferSpec>,
         (bins, results, range_bytes): (&PatchBins, &GatheredLayout, &[u8]),
-        layers: &[&[Brick]],
+        bricks: &[Brick],
         (old, is_new): (Option<Self>, bool),
     ) -> Result<Self, RenderError> {
         let FrameInputs { device, queue, request, .. } = inputs;
@@ -290,7 +319,7 @@ impl TileBuffers<Buffer> {
             bins: rewrite(old.bins, &spec.bins, bytemuck::cast_slice(&bins.words))?,
             half_boxes: write(old.half_boxes, &spec.half_boxes, bytemuck::cast_slice(&half_boxes))?,
             bricks: match spec.bricks {
-                Some(spec) => Some(rewrite(old.bricks, &spec, bytemuck::cast_slice(&layers.concat()))?),
+                Some(spec) => Some(rewrite(old.bricks, &spec, bytemuck::cast_slice(bricks))?),
                 None => None,
             },
             gathered: grown(device, old.gathered, &spec.gathered)?,
@@ -299,7 +328,7 @@ impl TileBuffers<Buffer> {
                 (Some(spec), Some(after)) => {
                     let format = inputs.volume.gpu_volume().value_format();
                     let mut planes = [FieldPlanes::zeroed(); MOST_LAYERS];
-                    for (layer, planes) in planes[..layers.len()].iter_mut().enumerate() {
+                    for (layer, planes) in planes[..request.stored.len()].iter_mut().enumerate() {
                         *planes = request.planes(after, layer, format);
                     }
                     Some(write(old.planes, &spec, bytemuck::bytes_of(&planes))?)
@@ -356,11 +385,6 @@ impl TileBuffers<BufferSpec> {
 /// The size of what all layers are drawn onto planes by.
 const PLANES_BYTES: u64 = (MOST_LAYERS * size_of::<FieldPlanes>()) as u64;
 
-/// The number of bricks in some layers.
-fn count(layers: &[&[Brick]]) -> u32 {
-    layers.iter().map(|bricks| bricks.len() as u32).sum()
-}
-
 /// The maximum size of a storage binding in bytes.
 fn binding(limits: &Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
@@ -387,14 +411,14 @@ fn range_stride(limits: &Limits) -> usize {
     size_of::<PatchRange>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
-fn bins(limits: &Limits, request: &FrameRequest, layers: &[&[Brick]], search: u32) -> Result<PatchBins, RenderError> {
+fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) -> Result<PatchBins, RenderError> {
     let FrameRequest { view, splatting, kernel, covered, after, .. } = request;
     let planes = after.as_ref().map(|after| &after.planes);
     let most_words = binding(limits) / 4;
     let (order, support) = (drawn_order(splatting), kernel.support());
-    let work = Work { search, threads: request.subgroup_threads };
+    let work = Work { search, threads: request.subgroup_threads, layers: layer_count(request) };
     let of_groups = (covered.clone(), &drawn(request));
-    Ok(PatchBins::new(layers, (view, planes), order, of_groups, support, work, most_words)?)
+    Ok(PatchBins::new(bricks, (view, planes), order, of_groups, support, work, most_words)?)
 }
 
 /// The slabs that are drawn: with planes also the one before the first that is composited, because a group holds its slabs' far planes.
@@ -409,7 +433,7 @@ fn plane_mode(request: &FrameRequest) -> Option<PlaneMode> {
     Some(PlaneMode {
         gradient: *gradient,
         exact: needs.coefficients.is_some(),
-        layers: request.stored.len() as u32,
+        layers: layer_count(request),
         own_colors: request.colored() > 0,
     })
 }

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use glam::{DVec3, UVec3};
 use sheetsplat::headless::{Backend, GpuHeadless};
 use sheetsplat::scene::TransferSettings;
 use sheetsplat::settings::{
@@ -83,6 +84,45 @@ fn whole_frames_are_those_of_the_twin() {
             scene.splatting.order = Order::BackToFront;
         }
         assert_is_the_twins(&gpu, &volume, &scene, &format!("{count} channels"));
+    }
+}
+
+/// Tiles find the voxels of all channels at once. Here some channels share bricks, some have their own, holes lie in others' matter, and at a pixel a voxel more
+/// voxels lie behind a patch than are held at a time.
+#[test]
+fn channels_of_different_bricks_are_each_drawn_whole() {
+    let gpu = gpu();
+    let mut random = Random(813);
+    for (count, side, pixels) in [(3, 26, 30), (10, 14, 40)] {
+        let dims = UVec3::splat(side);
+        let channel = |number: u32| {
+            let middle = DVec3::splat(f64::from(side)) * (0.3 + 0.05 * f64::from(number));
+            let reach = f64::from(side) * if number == 0 { 0.9 } else { 0.25 };
+            let values = (0..dims.element_product()).map(|index| {
+                let voxel = UVec3::new(index % side, index / side % side, index / (side * side)).as_dvec3();
+                let is_hole = number % 2 == 1 && random.bits().is_multiple_of(40);
+                if is_hole { f32::NAN } else { ((reach - voxel.distance(middle)) * 30.0).max(0.0) as f32 }
+            });
+            Volume::new("ball", dims, DVec3::ONE, values.collect()).unwrap()
+        };
+        let channels: Vec<Volume> = (0..count).map(channel).collect();
+        let volume = joined(&channels.iter().collect::<Vec<_>>());
+        let mut scene = scene(pixels, pixels);
+        scene.camera = camera([0.3, 0.9, -0.2], f64::from(side) * 1.1);
+        scene.splatting.classification = Classification::After;
+        scene.splatting.compositing = Compositing::Exponential;
+        let transfers: Vec<TransferSettings> = (0..count)
+            .map(|number| {
+                let color = [1.0, f64::from(number) / f64::from(count), f64::from(number % 2)];
+                transfer(&[(0.0, color)], &[(20.0, 0.0), (90.0, 0.2)])
+            })
+            .collect();
+        set_transfers(&mut scene, &transfers);
+        scene.splatting.culling = false;
+        assert_is_the_twins(&gpu, &volume, &scene, &format!("{count} channels"));
+        let [quads, tiles] = [Rasterizer::Quads, Rasterizer::Tiles]
+            .map(|rasterizer| gpu.render_volume(volume.clone(), &by(rasterizer, &scene)).unwrap().stats.counts);
+        assert_eq!(tiles.voxels_shaded, quads.voxels_shaded, "{count} channels");
     }
 }
 

@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use glam::{DVec2, DVec4, UVec3};
+use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::internals::brick::{self, BrickList};
 use sheetsplat::internals::gpu::layout::Brick;
 use sheetsplat::internals::kernel::Kernel;
@@ -56,24 +56,15 @@ impl Case {
 
     /// The bins of some slabs.
     fn bins_of(&self, drawn: &Range<i32>, most_words: u64) -> Result<PatchBins, TileCapacityError> {
-        self.bins_of_layers(&[self.bricks.bricks()], drawn, most_words)
-    }
-
-    fn bins_of_layers(
-        &self,
-        layers: &[&[Brick]],
-        drawn: &Range<i32>,
-        most_words: u64,
-    ) -> Result<PatchBins, TileCapacityError> {
         let Scene { camera, splatting, image, .. } = &self.scene;
         let view = ViewGeometry::new(&self.grid, camera, splatting, [image.width, image.height]).unwrap();
         PatchBins::new(
-            layers,
+            self.bricks.bricks(),
             (&view, None),
             splatting.order,
             (0.0..0.0, drawn),
             self.kernel().support(),
-            Work { search: 0, threads: 8 },
+            Work { search: 0, threads: 8, layers: 1 },
             most_words,
         )
     }
@@ -172,42 +163,31 @@ fn dispatches_are_enough() {
     }
 }
 
-/// The bins of a layer are its own, with bricks numbered behind those of the layers before it.
 #[test]
-fn layers_have_bins_of_their_own() {
+fn joined_bricks_have_the_voxels_of_all_lists() {
     let mut random = Random(54);
-    for _ in 0..6 {
-        let mut case = Case::new(&mut random, [1.0, 1.0, 2.0], [64, 48]);
-        case.scene.splatting.order = Order::FrontToBack;
-        let others = BrickList::new(&case.grid, &[7, 900, 2100, 3500]);
-        let of = |layers: &[&[Brick]]| case.bins_of_layers(layers, &Window::whole([1; 2]).slabs, u64::MAX).unwrap();
-        let layers = [case.bricks.bricks(), others.bricks()];
-        let all = of(&layers);
-        assert_eq!(all.bins, 2 * all.patches * all.groups);
-        let entries = |bins: &PatchBins, layer: u32, patch: u32, group: i32| -> Vec<u32> {
-            if !(0..bins.groups as i32).contains(&group) {
-                return Vec::new();
-            }
-            let bin = ((layer * bins.patches + patch) * bins.groups + group as u32) as usize;
-            bins.words[bins.starts()[bin] as usize..bins.starts()[bin + 1] as usize].to_vec()
-        };
-        let mut first = 0;
-        for (layer, bricks) in (0..).zip(layers) {
-            let alone = of(&[bricks]);
-            // A layer may not reach the first group of all.
-            let before = (alone.first_slab - all.first_slab) / SHEETS as i32;
-            let mut held = 0;
-            for (patch, group) in
-                (0..all.patches).flat_map(|patch| (0..all.groups as i32).map(move |group| (patch, group)))
-            {
-                let expected = entries(&alone, 0, patch, group - before).into_iter().map(|brick| brick + first);
-                held += expected.len();
-                assert_eq!(entries(&all, layer, patch, group), expected.collect::<Vec<_>>());
-            }
-            assert!(held > 0, "layer {layer}");
-            first += bricks.len() as u32;
+    let grid = Grid::new(UVec3::new(13, 9, 10), DVec3::ONE);
+    let all: Vec<u32> = (0..grid.dims.element_product()).collect();
+    let mut some = |one_in: u64| all.iter().copied().filter(|_| random.bits().is_multiple_of(one_in)).collect();
+    let voxels: Vec<Vec<u32>> = [2, 50, 200, 9, 1000, 30, 70, 40, 300, 90].map(&mut some).to_vec();
+    let lists: Vec<BrickList> = voxels.iter().map(|voxels| BrickList::new(&grid, voxels)).collect();
+    let joined = brick::joined(&lists.iter().map(BrickList::bricks).collect::<Vec<_>>());
+    let mut union = voxels.concat();
+    union.sort_unstable();
+    union.dedup();
+    let without_lists: Vec<Brick> =
+        joined.iter().map(|brick| Brick { extent: brick.extent & 0xffff, ..*brick }).collect();
+    assert_eq!(without_lists, BrickList::new(&grid, &union).bricks());
+    for (number, list) in lists.iter().enumerate() {
+        let has = |at: &Brick| list.bricks().iter().any(|brick| brick::position(brick) == brick::position(at));
+        for brick in &joined {
+            assert_eq!(brick.extent >> (16 + number) & 1 == 1, has(brick), "list {number}, {brick:?}");
         }
     }
+    // Bricks that have become empty are left out.
+    let mut left = lists[1].clone();
+    left.change(&[], &voxels[1]);
+    assert_eq!(brick::joined(&[left.bricks(), left.bricks()]), []);
 }
 
 #[test]

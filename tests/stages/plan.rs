@@ -104,7 +104,7 @@ fn assert_holds(list: &BrickList, voxels: &[u32]) {
     let mut seen: Vec<u32> = Vec::new();
     for (at, brick) in list.bricks().iter().enumerate() {
         let low = UVec3::new(brick.x, brick.y, brick.z);
-        let high = low + UVec3::new(brick.extent & 0xff, (brick.extent >> 8) & 0xff, brick.extent >> 16);
+        let high = low + UVec3::new(brick.extent & 3, (brick.extent >> 2) & 3, (brick.extent >> 4) & 3);
         let places: Vec<UVec3> = brick::voxels(brick).map(|(_, voxel)| voxel).collect();
         // The box is tight: some voxel touches every side, and none lies outside.
         if !places.is_empty() {

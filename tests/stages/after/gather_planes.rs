@@ -55,18 +55,18 @@ fn gathered(prepared: &Prepared<'_>, stage: &Gather, first_hit: Option<f64>, ban
     let geometry = PlaneGeometry::new(view, volume.grid());
     let covered = means::covered(view, volume.grid(), splatting);
     let bins = PatchBins::new(
-        &[bricks],
+        bricks,
         (view, Some(&geometry)),
         Order::FrontToBack,
         (covered, &Window::whole([1; 2]).slabs),
         kernel.support(),
-        Work { search: search(prepared), threads: 8 },
+        Work { search: search(prepared), threads: 8, layers: 1 },
         u64::MAX,
     )
     .unwrap();
     let mut planes = [FieldPlanes::zeroed(); MOST_LAYERS];
     planes[0] = prepared.field_planes;
-    let results = GatheredLayout::new(view, &bins, bricks.len() as u32);
+    let results = GatheredLayout::new(view, &bins, bricks.len() as u32, 1);
     let gather = uniforms::gather(view, &kernel, splatting, &bins, &results);
     let [columns, _] = patch_bins::grid(size);
     let bands: Vec<(u32, u32)> =

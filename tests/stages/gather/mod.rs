@@ -57,12 +57,12 @@ impl<'a> Fixture<'a> {
         let Seen { view, kernel, scene: Scene { splatting, .. }, .. } = &self.seen;
         let covered = means::covered(view, self.volume.grid(), splatting);
         PatchBins::new(
-            &[self.bricks.bricks()],
+            self.bricks.bricks(),
             (view, None),
             splatting.order,
             (covered, &Window::whole([1; 2]).slabs),
             kernel.support(),
-            Work { search: 0, threads: 8 },
+            Work { search: 0, threads: 8, layers: 1 },
             u64::MAX,
         )
         .unwrap()
@@ -78,7 +78,7 @@ impl<'a> Fixture<'a> {
         let values = VolumeTexture::upload_folded(device, gpu.queue(), volume.values(), side);
         let grid = (volume.grid(), values.format);
         let frame = uniforms::frame(&seen.view, &seen.kernel, grid, &ramps, &seen.scene);
-        let results = GatheredLayout::new(&seen.view, bins, bricks.len() as u32);
+        let results = GatheredLayout::new(&seen.view, bins, bricks.len() as u32, 1);
         let mut gather = uniforms::gather(&seen.view, &seen.kernel, &seen.scene.splatting, bins, &results);
         gather.near = near.unwrap_or(gather.near);
         let ([columns, _], tile_rows) = (patch_bins::grid(size), patch_bins::PATCH[1]);
