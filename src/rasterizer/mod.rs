@@ -7,6 +7,7 @@ pub(crate) mod kind;
 pub(crate) mod quads;
 pub(crate) mod request;
 pub(crate) mod samples;
+mod search_passes;
 mod sheet_groups;
 pub(crate) mod tiles;
 

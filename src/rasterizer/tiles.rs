@@ -25,7 +25,8 @@ use crate::pass::gather::{
     min_workgroup_bytes,
 };
 use crate::rasterizer::request::{After, FrameRequest};
-use crate::settings::splatting::{Compositing, Order};
+use crate::rasterizer::search_passes;
+use crate::settings::splatting::Order;
 
 /// The rasterizer's stage.
 #[derive(Debug, Default)]
@@ -151,7 +152,7 @@ impl TileRasterizer {
     ) -> Result<FrameEstimate, RenderError> {
         let joined = joined(layers);
         let bricks = all_bricks(layers, &joined);
-        let bins = bins(limits, request, bricks, all_search_passes(request, by_label))?;
+        let bins = bins(limits, request, bricks, search_passes::of(request, by_label))?;
         let results = GatheredLayout::new(&request.view, &bins, bricks.len() as u32, layer_count(request));
         let are_joined = layers.len() != 1 || lists != 1;
         let mut buffers: Vec<BufferSpec> =
@@ -222,7 +223,7 @@ impl Binned {
     ) -> Result<(Self, bool), RenderError> {
         let FrameInputs { volume, request, .. } = inputs;
         let FrameRequest { splatting, view, kernel, covered, .. } = request;
-        let search = all_search_passes(request, inputs.labels().is_some());
+        let search = search_passes::of(request, inputs.labels().is_some());
         let (order, planes) = (drawn_order(splatting), request.after.as_ref().map(|after| after.planes));
         let is_current = |old: &Self| {
             old.view == *view
@@ -447,45 +448,6 @@ fn check_workgroup_memory(limits: &Limits, request: &FrameRequest) -> Result<(),
         return Err(RenderError::Limit { what, limit, required, actual });
     }
     Ok(())
-}
-
-/// The passes through loops that a transfer function costs: before splatting those to look up a voxel's control points, where all ramps are searched in
-/// memory if any is, because threads hold at most one point each; after splatting those to find a surface in a slab.
-fn all_search_passes(request: &FrameRequest, by_label: bool) -> u32 {
-    let lengths = request.ramps.lengths();
-    if let Some(after) = &request.after {
-        let is_surface = request.splatting.compositing == Compositing::Surface;
-        return if is_surface { surface_passes(request, after, by_label) } else { 0 };
-    }
-    let channels = request.ramps.channels;
-    let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.subgroup_threads);
-    let searches = 1 + lengths.iter().map(|&points| search_passes(points)).sum::<u32>();
-    if in_memory { channels * (1 + searches) } else { 0 }
-}
-
-/// The number of points that are tested for a surface in a cell of a table: `SAMPLES` of `shaders/shared/first_surface.wgsl` and one more, or its two ends.
-const TESTED_POINTS: [u32; 2] = [2, 33];
-
-/// The number of bisections between two of them: `F32_HALVINGS` there.
-const HALVINGS: u32 = 24;
-
-/// The maximum number of passes to find a surface in a slab.
-fn surface_passes(request: &FrameRequest, after: &After, by_label: bool) -> u32 {
-    let [.., points] = request.ramps.lengths();
-    let is_graded = points > 1;
-    // Every test may look up the gradient's opacity.
-    let of_test = 1 + if is_graded { 3 + search_passes(points) } else { 2 };
-    let tested = TESTED_POINTS[usize::from(is_graded)];
-    let cells = request.ramps.cells();
-    let of_cells = cells * (4 + tested * of_test) + HALVINGS * of_test + 2 * (2 + search_passes(cells.max(1)));
-    // Where each voxel has its own table, the way through its cell is searched by itself.
-    let borders = after.planes.slab_step(&request.view).to_array().map(|step| step as u32 + 2);
-    if by_label { borders.iter().sum::<u32>().saturating_mul(1 + of_cells) } else { of_cells }
-}
-
-/// The passes through loops of a binary search among `points` control points.
-fn search_passes(points: u32) -> u32 {
-    points.ilog2() + 2
 }
 
 /// The buffers of the previous frame, each of which may be reused.

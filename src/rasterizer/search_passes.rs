@@ -1,0 +1,43 @@
+//! The passes through loops that a transfer function costs the tile rasterizer, which counts them ([`patch_bins`](crate::lists::patch_bins)).
+
+use crate::rasterizer::request::{After, FrameRequest};
+use crate::settings::splatting::Compositing;
+
+/// Before splatting those to look up a voxel's control points, where all ramps are searched in memory if any is, because threads hold at most one point each; after
+/// splatting those to find a surface in a slab.
+pub(super) fn of(request: &FrameRequest, by_label: bool) -> u32 {
+    let lengths = request.ramps.lengths();
+    if let Some(after) = &request.after {
+        let is_surface = request.splatting.compositing == Compositing::Surface;
+        return if is_surface { surface_passes(request, after, by_label) } else { 0 };
+    }
+    let channels = request.ramps.channels;
+    let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.subgroup_threads);
+    let searches = 1 + lengths.iter().map(|&points| of_search(points)).sum::<u32>();
+    if in_memory { channels * (1 + searches) } else { 0 }
+}
+
+/// The number of points that are tested for a surface in a cell of a table: `SAMPLES` of `shaders/shared/first_surface.wgsl` and one more, or its two ends.
+const TESTED_POINTS: [u32; 2] = [2, 33];
+
+/// The number of bisections between two of them: `F32_HALVINGS` there.
+const HALVINGS: u32 = 24;
+
+/// The maximum number of passes to find a surface in a slab.
+fn surface_passes(request: &FrameRequest, after: &After, by_label: bool) -> u32 {
+    let [.., points] = request.ramps.lengths();
+    let is_graded = points > 1;
+    // Every test may look up the gradient's opacity.
+    let of_test = 1 + if is_graded { 3 + of_search(points) } else { 2 };
+    let tested = TESTED_POINTS[usize::from(is_graded)];
+    let cells = request.ramps.cells();
+    let of_cells = cells * (4 + tested * of_test) + HALVINGS * of_test + 2 * (2 + of_search(cells.max(1)));
+    // Where each voxel has its own table, the way through its cell is searched by itself.
+    let borders = after.planes.slab_step(&request.view).to_array().map(|step| step as u32 + 2);
+    if by_label { borders.iter().sum::<u32>().saturating_mul(1 + of_cells) } else { of_cells }
+}
+
+/// The passes through loops of a binary search among `points` control points.
+fn of_search(points: u32) -> u32 {
+    points.ilog2() + 2
+}
