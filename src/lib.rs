@@ -174,7 +174,7 @@ pub use wgpu;
 #[doc(hidden)]
 pub mod internals {
     pub use crate::geometry::{footprint, grid_warp, means, plane_geometry, slab, view_geometry};
-    pub use crate::lists::{brick, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
+    pub use crate::lists::{brick, brick_union, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;

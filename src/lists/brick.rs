@@ -4,7 +4,6 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, UVec3};
 
-use crate::parallel::prelude::*;
 use crate::volume::Grid;
 
 /// The side of a brick in voxels.
@@ -25,7 +24,7 @@ pub struct Brick {
     pub y: u32,
     /// Least z.
     pub z: u32,
-    /// Greatest minus least x, y and z, two bits each; from bit 16 on, where lists were [joined], the lists that have the brick.
+    /// Greatest minus least x, y and z, two bits each; from bit 16 on, where lists were joined, the lists that have the brick.
     pub extent: u32,
 }
 
@@ -138,34 +137,6 @@ pub fn bounds(brick: &Brick) -> (DVec3, DVec3) {
     (UVec3::new(brick.x, brick.y, brick.z).as_dvec3() + half, half)
 }
 
-/// The bricks of several lists, at most 16, as one list, each with the voxels of all, in memory order.
-pub fn joined(lists: &[&[Brick]]) -> Vec<Brick> {
-    let with_list = |(number, bricks): (usize, &&[Brick])| {
-        let list = 1_u32 << (16 + number);
-        bricks
-            .iter()
-            .filter(|brick| brick.present != [0; 2])
-            .map(move |brick| Brick { extent: list, ..*brick })
-            .collect()
-    };
-    let mut all: Vec<Brick> = lists.iter().enumerate().flat_map::<Vec<Brick>, _>(with_list).collect();
-    all.par_sort_by_key(position);
-    all.dedup_by(|other, brick| {
-        let is_same = position(other) == position(brick);
-        if is_same {
-            brick.present = [brick.present[0] | other.present[0], brick.present[1] | other.present[1]];
-            brick.extent |= other.extent;
-        }
-        is_same
-    });
-    all.par_iter_mut().for_each(|brick| {
-        let lists = brick.extent;
-        fit(brick);
-        brick.extent |= lists;
-    });
-    all
-}
-
 /// A key that sorts bricks in memory order, whatever the order in which they were added.
 pub fn position(brick: &Brick) -> [u32; 3] {
     [brick.z / SIDE, brick.y / SIDE, brick.x / SIDE]
@@ -194,7 +165,7 @@ fn slot_of(grid: &Grid, voxel: u32) -> u32 {
 }
 
 /// Fits a brick's box tightly around its voxels.
-fn fit(brick: &mut Brick) {
+pub(super) fn fit(brick: &mut Brick) {
     // Masks of the first layer across x, y and z; shifts by a bit, a row or a slice give the others.
     const LAYERS: [(u64, u32); 3] = [(0x1111_1111_1111_1111, 1), (0x000f_000f_000f_000f, SIDE), (0xffff, SIDE * SIDE)];
     let bits = present(brick);

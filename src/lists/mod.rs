@@ -2,6 +2,7 @@
 //! bricks, buckets, and the rasterizers' plans of a frame. All of it is plain data, made without a GPU.
 
 pub mod brick;
+pub mod brick_union;
 pub mod bucket;
 pub mod classify;
 pub(crate) mod extent;

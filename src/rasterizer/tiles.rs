@@ -18,7 +18,7 @@ use crate::gpu::layout::{Brick, FieldPlanes, Gather as GatherUniform, PatchRange
 use crate::gpu::targets::BandBuffer;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
-use crate::lists::brick;
+use crate::lists::brick_union;
 use crate::lists::patch_bins::{self, PatchBins, SHEETS, Work};
 use crate::pass::gather::{
     Gather, GatherBand, GatherBuffers, GatherMode, GatheredPlanes, MOST_LAYERS, PlaneMode, drawn_order,
@@ -258,7 +258,7 @@ impl Binned {
 
 /// The bricks of several layers as one list; empty if there is one layer.
 fn joined(layers: &[&[Brick]]) -> Vec<Brick> {
-    if layers.len() == 1 { Vec::new() } else { brick::joined(layers) }
+    if layers.len() == 1 { Vec::new() } else { brick_union::of(layers) }
 }
 
 /// The bricks of all layers, given those of several [joined](joined).

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::internals::brick::{self, BrickList};
+use sheetsplat::internals::brick_union;
 use sheetsplat::internals::gpu::layout::Brick;
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::patch_bins::{self, PATCH, PatchBins, SHEETS, TileCapacityError, Work};
@@ -171,7 +172,7 @@ fn joined_bricks_have_the_voxels_of_all_lists() {
     let mut some = |one_in: u64| all.iter().copied().filter(|_| random.bits().is_multiple_of(one_in)).collect();
     let voxels: Vec<Vec<u32>> = [2, 50, 200, 9, 1000, 30, 70, 40, 300, 90].map(&mut some).to_vec();
     let lists: Vec<BrickList> = voxels.iter().map(|voxels| BrickList::new(&grid, voxels)).collect();
-    let joined = brick::joined(&lists.iter().map(BrickList::bricks).collect::<Vec<_>>());
+    let joined = brick_union::of(&lists.iter().map(BrickList::bricks).collect::<Vec<_>>());
     let mut union = voxels.concat();
     union.sort_unstable();
     union.dedup();
@@ -187,7 +188,7 @@ fn joined_bricks_have_the_voxels_of_all_lists() {
     // Bricks that have become empty are left out.
     let mut left = lists[1].clone();
     left.change(&[], &voxels[1]);
-    assert_eq!(brick::joined(&[left.bricks(), left.bricks()]), []);
+    assert_eq!(brick_union::of(&[left.bricks(), left.bricks()]), []);
 }
 
 #[test]
