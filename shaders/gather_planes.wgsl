@@ -205,7 +205,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
 
 // Adds the layer's slabs in front of the four planes, whose sums are complete, to the group's; after the last layer they are composited.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
-    passes += passes_per_look() + PASSES_PER_SLABS;
+    passes += passes_per_look() + PASSES_PER_SLABS + select(0u, PASSES_PER_SUMS, CHANNELS > 1u);
     find_stretches(pixels.column, pixels.rows);
     if FIRST_HIT {
         load_hits(pixels);
@@ -227,3 +227,6 @@ const PASSES_PER_LOAD = 2u;
 
 // Passes to classify, shade and composite four slabs at four pixels.
 const PASSES_PER_SLABS = 200u;
+
+// Passes to add their sheets to those of other layers.
+const PASSES_PER_SUMS = 64u;

@@ -15,7 +15,7 @@
 // Needs gather/voxels.wgsl: GatheredGroup, find_voxels, keep_voxels, may_appear, search_bounds.
 // Needs gather/walk.wgsl: is_walked, walk.
 // Needs gather_planes.wgsl: add_sections, begin_layer, composite_pixels, counts_gaps, draws_all_groups, is_due_without_voxels, layers, looks_along_rays, shade_voxels, shallow_after.
-// Needs shared/brick.wgsl: Brick, Indirect, indirect, unfold.
+// Needs shared/brick.wgsl: Brick, Indirect, LAYER_BITS, indirect, layer_bit, unfold.
 // Needs shared/cut.wgsl: Cut, FAR.
 // Needs shared/frame.wgsl: FRONT_TO_BACK, TILE, frame, start, tile_grid, zero.
 @group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
@@ -223,7 +223,8 @@ fn finish(at: u32, reached: u32) {
     }
 }
 
-// Draws a group's layers, given by its patch and its place in compositing order. Voxels are found once for all layers, if the queue has room for them.
+// Draws a group's layers, given by its patch and its place in compositing order. Voxels are found once for all layers, if the queue has room for them; if not, each
+// layer after the first finds its own.
 fn draw_group(corner: vec2u, threads: vec2u, thread: u32, place: vec2u, is_kept: bool) -> GroupOutcome {
     if !is_kept {
         queue_count = 0u;
@@ -238,7 +239,7 @@ fn draw_group(corner: vec2u, threads: vec2u, thread: u32, place: vec2u, is_kept:
             queue_count = 0u;
         }
         if !is_found {
-            walk(bins[bin], bins[bin + 1u]);
+            walk(bins[bin], bins[bin + 1u], select(layer_bit(layer), LAYER_BITS, layer == 0u));
         }
         // Voxels have amounts of their own in each layer.
         let first = select(0u, queue_count, layers() == 1u);

@@ -1,4 +1,4 @@
-// The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once, and kept for as long as their kernels reach
+// The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once for each layer, and kept for as long as their kernels reach
 // into the next sheet group. They are in workgroup memory, of which every subgroup has its own part.
 //
 // Needs gather.wgsl: current_layer, layers.

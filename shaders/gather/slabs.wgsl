@@ -50,7 +50,8 @@ var<private> halves_handed_on: u32;
 // A mask of the halves of blocks in which a layer of the group has been drawn.
 var<private> halves_with_sheets: u32;
 
-// The sheets of a group's slabs at all of a patch's pixels, added up over layers; and which of a thread's there are, 16 bits for each of its rounds.
+// The sheets of a group's slabs at all of a patch's pixels, added up over layers; and for each of a thread's rounds a bit for every slab and pixel that
+// has such a sheet.
 override LAYER_SHEETS: u32 = 1u;
 var<workgroup> layer_sheets: array<vec4f, LAYER_SHEETS>;
 var<private> sheets_of_layers: vec4u;
@@ -264,7 +265,8 @@ fn is_chosen_from() -> bool {
     return is_by_means() && COMPOSITING != SURFACE;
 }
 
-// Adds a layer's sheet to those of the layers before it, and composites the sum of all. `slab` counts a thread's slabs and pixels.
+// Adds a layer's sheet to those of the layers before it, and composites the sum of all. `slab` is the number of the slab and pixel among the
+// thread's.
 fn composite_layer(sheet: vec4f, part: vec2f, image: vec4f, thread: u32, slab: u32) -> Composited {
     var sum = sheet;
     if CHANNELS > 1u {

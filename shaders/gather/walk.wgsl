@@ -28,6 +28,8 @@ struct Walk {
     // The entries that have not been fetched yet.
     next: u32,
     end: u32,
+    // A mask of the layers whose bricks are visited.
+    wanted: u32,
     // Bricks are fetched one per lane: the brick's index, corner and voxels, and a mask of the lanes whose bricks must be visited.
     to_visit: u32,
     fetched: u32,
@@ -45,7 +47,8 @@ struct Walk {
 
 var<private> walk_state: Walk;
 
-fn walk(first: u32, end: u32) {
+fn walk(first: u32, end: u32, wanted: u32) {
+    walk_state.wanted = wanted;
     walk_state.next = first;
     walk_state.end = end;
     walk_state.to_visit = 0u;
@@ -66,6 +69,7 @@ fn fetch_bricks(search: SearchBounds) {
     walk_state.fetched_present = record.present;
     walk_state.fetched_layers = layers_of(record);
     var may_hold = walk_state.next + lane < walk_state.end;
+    may_hold &= layers() == 1u || (walk_state.fetched_layers & walk_state.wanted) != 0u;
     if !PERSPECTIVE {
         let middle = homogeneous(vec4f(vec3f(walk_state.fetched_corner) + 1.5, 1.0)).xyz;
         let rows = frame.screen_from_voxel;

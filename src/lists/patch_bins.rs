@@ -50,6 +50,9 @@ const MAX_PASSES_OF_BRICK_OF_VALUES: u32 = MAX_PASSES_OF_BRICK - 40;
 /// The number of passes that classify and composite four slabs of a block.
 const MAX_PASSES_OF_SLABS: u32 = 200;
 
+/// The number of passes that add the sheets of these slabs to those of other layers.
+const MAX_PASSES_OF_SUMS: u32 = 64;
+
 /// The number of these slabs at the pixels of a thread.
 const SLABS_OF_THREAD: u32 = 4 * SHEETS;
 
@@ -96,6 +99,7 @@ impl Passes {
             ),
             false => (MAX_PASSES_OF_BRICK + SHADED_PER_BRICK * search, 0),
         };
+        let of_slabs = of_slabs.saturating_add(if layers > 1 { MAX_PASSES_OF_SUMS } else { 0 });
         let of_block = of_slabs.saturating_add(MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
         let per_group = layers.saturating_mul(blocks.saturating_mul(of_block).saturating_add(MAX_PASSES_OF_GROUP));
         // Where the queue cannot hold what is found for all layers, each finds its own.
