@@ -43,7 +43,7 @@ struct Sheets {
 override SUMS: u32 = 5u;
 override SAVED: u32 = 640u;
 
-// The sums of all of a patch's threads, while voxels of the group wait for room in the queue.
+// The sums of all of a patch's threads, while voxels of the group wait for room in the queue; then the samples on its planes (`gather/slabs.wgsl`).
 var<workgroup> saved: array<vec4f, SAVED>;
 
 fn save_sheets(thread: u32, sheets: Sheets) {

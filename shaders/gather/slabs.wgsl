@@ -2,7 +2,7 @@
 //
 // Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PATCH_THREADS, PERSPECTIVE, SHEETS, THREADS, acc, cut, gather, passes, sheet_group.
 // Needs gather/pixels.wgsl: Pixels, halves_of.
-// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, colors_of, fields_of.
+// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, colors_of, fields_of, saved.
 // Needs gather_planes.wgsl: carried, is_last_layer.
 // Needs shared/cells.wgsl: nearest_voxel, voxel_at.
 // Needs shared/channels.wgsl: CHANNELS.
@@ -50,10 +50,7 @@ var<private> halves_handed_on: u32;
 // A mask of the halves of blocks in which a layer of the group has been drawn.
 var<private> halves_with_sheets: u32;
 
-// The sheets of a group's slabs at all of a patch's pixels, added up over layers; and for each of a thread's rounds a bit for every slab and pixel that
-// has such a sheet.
-override LAYER_SHEETS: u32 = 1u;
-var<workgroup> layer_sheets: array<vec4f, LAYER_SHEETS>;
+// For each of a thread's rounds a bit for every slab and pixel that has a sheet, added up over layers.
 var<private> sheets_of_layers: vec4u;
 
 fn sample_of(fields: Fields, i: u32) -> vec4f {
@@ -173,7 +170,8 @@ fn with_color(columns: mat4x4f, i: u32, color: vec4f) -> mat4x4f {
 }
 
 // Composites a layer's slabs at four pixels, or adds them to those of other layers. The near plane's field comes from the previous group, and the last
-// plane's goes to the next.
+// plane's goes to the next. First it is found which slabs may show anything; then every thread takes one of its own after the other, because drivers
+// that execute masked code take as long for those that show nothing.
 fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
     var result = transpose(image);
     var held: Records;
@@ -182,6 +180,9 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
         held = with_record(held, i, carried_by(carried_slot(pixels, i), carried_pixels()));
         held_colors = with_color(held_colors, i, carried_color(carried_slot(pixels, i), carried_pixels()));
     }
+    let points = Points(held, held_colors, pixels.thread);
+    // Bits of slabs, the four pixels of one after those of the other.
+    var shown = 0u;
     var is_handed_on = false;
     for (var j = 0u; j < SHEETS; j += 1u) {
         let near = sheet_group.near + f32(j) * frame.slab_width;
@@ -190,53 +191,113 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
         let fields = without_holes(fields_of(sums), pixels, far);
         let plane_colors = colors_of(sums, fields.has_value);
         for (var i = 0u; i < 4u; i += 1u) {
-            let before = record_at(held, i);
-            let color_before = color_of_pixel(held_colors, i);
-            var now = Composited(color_of_pixel(result, i), before, vec4f(), FAR, false);
+            let at = 4u * j + i;
             let drawn = sample_of(fields, i);
-            let drawn_color = color_of_pixel(plane_colors, i);
-            // The sum of an average's colours stays where a plane has no number.
-            now.carried_color = select(drawn_color, color_before, COMPOSITING == AVERAGE && before.z != 0u);
-            let place = place_in_slab(pixels, i, near, far);
-            let slab = slab_between(place, drawn, carried_sample(before), drawn_color, color_before);
-            let part = part_of(slab.ray, near, far);
-            let is_shown = min(drawn.x, carried_sample(before).x) != NO_NUMBER && may_show(slab, part, now.image);
-            passes += select(0u, gather.search_passes, subgroupAny(is_shown));
-            var sheet = vec4f(0.0);
-            for (var is_left = is_shown; is_left; is_left = false) {
-                let light = lighting(vec2f(pixels.column, pixels.rows[i]), PERSPECTIVE);
-                if is_chosen_from() {
-                    now = choose(slab, now.image, before, color_before, light);
-                } else if COMPOSITING == SURFACE {
-                    let found = find_surface(slab, now.image, light);
-                    now = Composited(found.image, now.carried, now.carried_color, found.hit, found.is_changed);
-                } else {
-                    sheet = sheet_of(slab, light);
-                }
+            let before = sample_before(points, at);
+            saved[sample_slot(at, pixels.thread)] = drawn;
+            if OWN_COLORS {
+                saved[color_slot(at, pixels.thread)] = color_of_pixel(plane_colors, i);
             }
-            if !is_by_means() {
-                let added = composite_layer(sheet, part, now.image, pixels.thread, j * 4u + i);
-                now = Composited(added.image, now.carried, now.carried_color, added.hit, added.is_changed);
-            }
-            result = with_color(result, i, now.image);
-            if FIRST_HIT && now.is_changed && (is_by_means() || now.hit != FAR) {
-                let hit = select(noted(now.hit), 0u, now.hit == FAR);
-                hits = select(hits, vec4u(hit), PIXELS == vec4u(i));
-            }
-            held = with_record(held, i, with_sample(now.carried, drawn));
-            held_colors = with_color(held_colors, i, now.carried_color);
+            let none = vec4f(0.0);
+            let slab = slab_between(place_in_slab(pixels, i, near, far), drawn, before, none, none);
+            let has_number = min(drawn.x, before.x) != NO_NUMBER;
+            let is_shown = has_number && may_show(slab, part_of(slab.ray, near, far), color_of_pixel(result, i));
+            shown |= select(0u, 1u << at, is_shown && pixels.is_inside[i]);
         }
         is_handed_on = any(fields.has_value & pixels.is_inside);
     }
+
+    var left = shown | select(0u, slabs_of_layers(pixels.thread), is_last_layer());
+    var count = 0u;
+    while left != 0u {
+        count += 1u;
+        let at = firstTrailingBit(left);
+        left &= left - 1u;
+        let i = at % 4u;
+        let near = sheet_group.near + f32(at / 4u) * frame.slab_width;
+        let far = near + frame.slab_width;
+        let before = with_sample(record_at(held, i), sample_before(points, at));
+        let has_sum = COMPOSITING == AVERAGE && before.z != 0u;
+        var color_before = vec4f(0.0);
+        var drawn_color = vec4f(0.0);
+        if OWN_COLORS {
+            // The sum of an average's colours stays where a plane has no number.
+            color_before = select(color_before_slab(points, at), color_of_pixel(held_colors, i), has_sum);
+            drawn_color = saved[color_slot(at, pixels.thread)];
+        }
+        var now = Composited(color_of_pixel(result, i), before, select(drawn_color, color_before, has_sum), FAR, false);
+        let place = place_in_slab(pixels, i, near, far);
+        let drawn = saved[sample_slot(at, pixels.thread)];
+        let slab = slab_between(place, drawn, carried_sample(before), drawn_color, color_before);
+        let part = part_of(slab.ray, near, far);
+        let light = lighting(vec2f(pixels.column, pixels.rows[i]), PERSPECTIVE);
+        if is_chosen_from() {
+            now = choose(slab, now.image, before, color_before, light);
+        } else if COMPOSITING == SURFACE {
+            let found = find_surface(slab, now.image, light);
+            now = Composited(found.image, now.carried, now.carried_color, found.hit, found.is_changed);
+        } else {
+            let is_own = CHANNELS == 1u || ((shown >> at) & 1u) != 0u;
+            let sheet = select(vec4f(0.0), sheet_of(slab, light), is_own);
+            let added = composite_layer(sheet, part, now.image, pixels, at);
+            now = Composited(added.image, now.carried, now.carried_color, added.hit, added.is_changed);
+        }
+        result = with_color(result, i, now.image);
+        if FIRST_HIT && now.is_changed && (is_by_means() || now.hit != FAR) {
+            let hit = select(noted(now.hit), 0u, now.hit == FAR);
+            hits = select(hits, vec4u(hit), PIXELS == vec4u(i));
+        }
+        if is_chosen_from() {
+            held = with_record(held, i, now.carried);
+            held_colors = with_color(held_colors, i, now.carried_color);
+        } else {
+            left &= ~select(0u, 0x1111u << i, !is_open(now.image));
+        }
+    }
+    passes += subgroupMax(count) * gather.search_passes;
+
     for (var i = 0u; i < 4u; i += 1u) {
+        let last = 4u * (SHEETS - 1u) + i;
+        let record = with_sample(record_at(held, i), saved[sample_slot(last, pixels.thread)]);
         if pixels.is_inside[i] {
-            carry(carried_slot(pixels, i), carried_pixels(), record_at(held, i));
-            carry_color(carried_slot(pixels, i), carried_pixels(), color_of_pixel(held_colors, i));
+            carry(carried_slot(pixels, i), carried_pixels(), record);
+            if OWN_COLORS {
+                let has_sum = COMPOSITING == AVERAGE && record.z != 0u;
+                let color = select(saved[color_slot(last, pixels.thread)], color_of_pixel(held_colors, i), has_sum);
+                carry_color(carried_slot(pixels, i), carried_pixels(), color);
+            }
         }
     }
     note_handed_on(pixels, is_handed_on);
     halves_with_sheets |= halves_of(pixels.thread);
     return transpose(result);
+}
+
+// The samples on a group's planes at a thread's pixels: those that the previous group handed on, and the others in `saved`, which no longer holds sums.
+struct Points {
+    held: Records,
+    held_colors: mat4x4f,
+    thread: u32,
+}
+
+// The slots of the sample and the colour on a slab's far plane.
+fn sample_slot(at: u32, thread: u32) -> u32 {
+    return at * PATCH_THREADS + thread;
+}
+
+fn color_slot(at: u32, thread: u32) -> u32 {
+    return (at + 4u * SHEETS) * PATCH_THREADS + thread;
+}
+
+// The sample and the colour on a slab's near plane, which is the far plane of the slab before.
+fn sample_before(points: Points, at: u32) -> vec4f {
+    let handed_on = carried_sample(record_at(points.held, at % 4u));
+    return select(saved[sample_slot(max(at, 4u) - 4u, points.thread)], handed_on, at < 4u);
+}
+
+fn color_before_slab(points: Points, at: u32) -> vec4f {
+    let handed_on = color_of_pixel(points.held_colors, at % 4u);
+    return select(saved[color_slot(max(at, 4u) - 4u, points.thread)], handed_on, at < 4u);
 }
 
 // The ray of a thread's `i`-th pixel in a slab.
@@ -253,11 +314,14 @@ fn may_show(slab: Slab, part: vec2f, image: vec4f) -> bool {
     if is_chosen_from() {
         return true;
     }
-    let is_open = frame.culling == 0u || image.a < frame.opacity_threshold;
     let is_seen = part.x < part.y && is_drawn(slab.near + 0.5 * frame.slab_width);
     // Labels' tables differ from cell to cell.
     let is_among = has_opacity(slab, table_at(slab.at, 0.5 * (part.x + part.y))) || (LABELS && COMPOSITING == SURFACE);
-    return is_open && is_seen && is_among;
+    return is_open(image) && is_seen && is_among;
+}
+
+fn is_open(image: vec4f) -> bool {
+    return frame.culling == 0u || image.a < frame.opacity_threshold;
 }
 
 // Whether a pixel's colour is that of a number chosen from all points.
@@ -265,21 +329,32 @@ fn is_chosen_from() -> bool {
     return is_by_means() && COMPOSITING != SURFACE;
 }
 
+// The slabs of a thread in which layers have sheets, as bits.
+fn slabs_of_layers(thread: u32) -> u32 {
+    let round = thread / THREADS;
+    return (sheets_of_layers[round / 2u] >> (16u * (round % 2u))) & 0xffffu;
+}
+
+// The slot of the sheets of a slab, added up over layers, among what pixels carry. They are at its end, as many for a pixel as a group has slabs.
+fn layer_sheet_slot(pixels: Pixels, slab: u32) -> u32 {
+    return arrayLength(&carried) - (SHEETS - slab / 4u) * carried_pixels() + carried_slot(pixels, slab % 4u);
+}
+
 // Adds a layer's sheet to those of the layers before it, and composites the sum of all. `slab` is the number of the slab and pixel among the
 // thread's.
-fn composite_layer(sheet: vec4f, part: vec2f, image: vec4f, thread: u32, slab: u32) -> Composited {
+fn composite_layer(sheet: vec4f, part: vec2f, image: vec4f, pixels: Pixels, slab: u32) -> Composited {
     var sum = sheet;
     if CHANNELS > 1u {
-        let place = slab * PATCH_THREADS + thread;
-        let round = thread / THREADS;
+        let place = layer_sheet_slot(pixels, slab);
+        let round = pixels.thread / THREADS;
         let bit = select(vec4u(0u), vec4u(1u << (slab + 16u * (round % 2u))), vec4u(round / 2u) == PIXELS);
         let is_added = sheet.a > 0.0;
         let is_after_others = any((sheets_of_layers & bit) != vec4u(0u));
         for (var is_read = is_after_others && (is_added || is_last_layer()); is_read; is_read = false) {
-            sum += layer_sheets[place];
+            sum += bitcast<vec4f>(carried[place]);
         }
         for (var is_kept = is_added && !is_last_layer(); is_kept; is_kept = false) {
-            layer_sheets[place] = sum;
+            carried[place] = bitcast<vec4u>(sum);
         }
         sheets_of_layers |= select(vec4u(0u), bit, is_added);
     }

@@ -6,6 +6,7 @@
 // and followed by the number chosen so far; for `average` the sum and the count of the numbers so far are in its place. A record of colours: the
 // colour and A on the previous plane; for `average` their sum once there is a number. Records of channels differ from these bits in `NOTHING_CARRIED`,
 // so that a cleared buffer holds nothing.
+// Tiles that add up several channels' sheets hold these behind all records; see `gather/slabs.wgsl`.
 
 // What a pixel carries before its first plane.
 const NOTHING_CARRIED = vec4u(NO_NUMBER_BITS, 0u, 0u, NO_NUMBER_BITS);

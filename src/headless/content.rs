@@ -54,7 +54,7 @@ fn crop<T: Copy>(pixels: &[T], (frame, first_row): (&PreparedFrame, u32), region
 fn extremes(
     (device, queue): (&Device, &Queue),
     frame: &PreparedFrame,
-    Carried { bands, range: [low, high] }: &Carried,
+    Carried { bands, range: [low, high], .. }: &Carried,
     region: &Region,
     colors: &[[f32; 4]],
 ) -> Result<Vec<Extreme>, RenderError> {

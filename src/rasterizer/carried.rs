@@ -14,28 +14,32 @@ use crate::rasterizer::request::FrameRequest;
 pub(crate) struct Carried {
     /// One buffer for every band of the compositing buffer.
     pub(crate) bands: Vec<Buffer>,
+    /// The bytes of each that a frame starts without.
+    cleared: Vec<u64>,
     /// The minimum and maximum number of the first channel's coefficients.
     pub(crate) range: [f32; 2],
 }
 
 impl Carried {
-    /// Allocates buffers that no longer fit.
+    /// Allocates buffers that no longer fit, with room for `further` records of a pixel that need not be cleared.
     ///
     /// # Errors
     /// If they exceed the device's maximum size of buffers.
     pub(crate) fn prepare(
         FrameInputs { device, request, .. }: FrameInputs<'_>,
         range: [f32; 2],
+        further: u32,
         old: Option<Self>,
     ) -> Result<Self, RenderError> {
         let mut old = old.map(|old| old.bands).unwrap_or_default().into_iter();
-        let bands = Self::specs(request).map(|spec| grown(device, old.next(), &spec)).collect::<Result<_, _>>()?;
-        Ok(Self { bands, range })
+        let bands =
+            Self::specs(request, further).map(|spec| grown(device, old.next(), &spec)).collect::<Result<_, _>>()?;
+        Ok(Self { bands, cleared: Self::specs(request, 0).map(|spec| spec.size).collect(), range })
     }
 
     /// The specs of the buffers.
-    pub(crate) fn specs(request: &FrameRequest) -> impl Iterator<Item = BufferSpec> {
-        let (width, records) = (u64::from(request.view.size[0]), u64::from(request.records()));
+    pub(crate) fn specs(request: &FrameRequest, further: u32) -> impl Iterator<Item = BufferSpec> {
+        let (width, records) = (u64::from(request.view.size[0]), u64::from(request.records() + further));
         request.bands.iter().map(move |&Band { rows, .. }| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             buffer_spec("sheetsplat.carried", width * u64::from(rows) * records * CARRIED_BYTES, usage)
@@ -44,7 +48,7 @@ impl Carried {
 
     /// Clears the records for a frame.
     pub(crate) fn clear(&self, encoder: &mut CommandEncoder) {
-        self.bands.iter().for_each(|band| encoder.clear_buffer(band, 0, None));
+        self.bands.iter().zip(&self.cleared).for_each(|(band, &bytes)| encoder.clear_buffer(band, 0, Some(bytes)));
     }
 
     /// Bytes of GPU memory.

@@ -21,6 +21,7 @@ use crate::gpu::uniforms;
 use crate::gpu::volume_texture::ValueFormat;
 use crate::image::channels::Joining;
 use crate::kernel::Kernel;
+use crate::lists::patch_bins::SHEETS;
 use crate::pass::composite::RayMode;
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
@@ -118,7 +119,8 @@ impl FrameRequest {
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let stored = volume.stored(layer);
         let is_after = splatting.classification == Classification::After;
-        let records = if is_after { records(&volume.gpu_volume().stored()) } else { 1 };
+        let of_pixel = |stored: &[Stored]| records(stored) + sheet_records(stored);
+        let records = if is_after { of_pixel(&volume.gpu_volume().stored()) } else { 1 };
         let bands = CompositingBuffer::bands_for(&device.limits(), size, records)?;
         let is_cut = surfaces.is_some() || !scene.clip.is_empty() || window.is_some();
         let rays = RayMode { cut: is_cut, first_hit: first_hit.is_some() };
@@ -185,6 +187,11 @@ impl FrameRequest {
         records(&self.stored)
     }
 
+    /// The records of a pixel's sheets that tiles add up over channels.
+    pub(crate) fn sheet_records(&self) -> u32 {
+        sheet_records(&self.stored)
+    }
+
     /// The number of pixels in the image.
     pub(crate) fn pixels(&self) -> u64 {
         self.view.size.map(u64::from).iter().product()
@@ -204,4 +211,9 @@ fn colored(stored: &[Stored]) -> u32 {
 /// The records that every pixel carries from plane to plane: one for each channel, and one for each with colours.
 fn records(stored: &[Stored]) -> u32 {
     stored.len() as u32 + colored(stored)
+}
+
+/// The records of a pixel's sheets that tiles add up over channels: one for each slab of a sheet group, if there are several channels.
+fn sheet_records(stored: &[Stored]) -> u32 {
+    if stored.len() > 1 { SHEETS } else { 0 }
 }

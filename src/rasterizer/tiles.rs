@@ -96,7 +96,9 @@ impl TileRasterizer {
             None => None,
         };
         let carried = match &request.after {
-            Some(after) => Some(Carried::prepare(inputs, after.numbers[0].range, old_carried)?),
+            Some(after) => {
+                Some(Carried::prepare(inputs, after.numbers[0].range, request.sheet_records(), old_carried)?)
+            }
             None => None,
         };
         let bands = self.bind(inputs, &binned.bins, (&buffers, carried.as_ref()), coefficients);
@@ -157,7 +159,7 @@ impl TileRasterizer {
         let are_joined = layers.len() != 1 || lists != 1;
         let mut buffers: Vec<BufferSpec> =
             TileBuffers::specs(limits, request, (&bins, &results), are_joined)?.all().collect();
-        buffers.extend(request.after.iter().flat_map(|_| Carried::specs(request)));
+        buffers.extend(request.after.iter().flat_map(|_| Carried::specs(request, request.sheet_records())));
         let bands = request.bands.len() as u64 * GatherBand::estimate(bins.dispatches);
         let groups = bins.groups as usize;
         Ok(FrameEstimate { bytes: sizes(limits, &buffers)? + bands, groups, passes: TileFrame::PASSES })
@@ -431,12 +433,7 @@ fn drawn(request: &FrameRequest) -> Range<i32> {
 /// What is gathered on planes, if classification comes after splatting.
 fn plane_mode(request: &FrameRequest) -> Option<PlaneMode> {
     let After { gradient, needs, .. } = request.after.as_ref()?;
-    Some(PlaneMode {
-        gradient: *gradient,
-        exact: needs.coefficients.is_some(),
-        layers: layer_count(request),
-        own_colors: request.colored() > 0,
-    })
+    Some(PlaneMode { gradient: *gradient, exact: needs.coefficients.is_some(), own_colors: request.colored() > 0 })
 }
 
 /// Checks that a patch's pixels fit into a workgroup's memory, of which sums with the kernel's gradient need most.
