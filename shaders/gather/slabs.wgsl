@@ -335,9 +335,27 @@ fn slabs_of_layers(thread: u32) -> u32 {
     return (sheets_of_layers[round / 2u] >> (16u * (round % 2u))) & 0xffffu;
 }
 
-// The slot of the sheets of a slab, added up over layers, among what pixels carry. They are at its end, as many for a pixel as a group has slabs.
-fn layer_sheet_slot(pixels: Pixels, slab: u32) -> u32 {
-    return arrayLength(&carried) - (SHEETS - slab / 4u) * carried_pixels() + carried_slot(pixels, slab % 4u);
+// The sheets of a group's first slab at all of a patch's pixels, added up over layers. Those of the other slabs are behind the records that pixels carry:
+// here they would take the queue's room, and all four there would make the second channel's memory more than the first one's.
+override LAYER_SHEETS: u32 = 1u;
+var<workgroup> layer_sheets: array<vec4f, LAYER_SHEETS>;
+
+// The record of the sheet of a slab behind the first.
+fn sheet_record(pixels: Pixels, slab: u32) -> u32 {
+    return arrayLength(&carried) - (SHEETS - max(slab / 4u, 1u)) * carried_pixels() + carried_slot(pixels, slab % 4u);
+}
+
+fn layer_sheet(pixels: Pixels, slab: u32) -> vec4f {
+    let first = layer_sheets[(slab % 4u) * PATCH_THREADS + pixels.thread];
+    return select(bitcast<vec4f>(carried[sheet_record(pixels, slab)]), first, slab < 4u);
+}
+
+fn keep_layer_sheet(pixels: Pixels, slab: u32, sheet: vec4f) {
+    if slab < 4u {
+        layer_sheets[slab * PATCH_THREADS + pixels.thread] = sheet;
+    } else {
+        carried[sheet_record(pixels, slab)] = bitcast<vec4u>(sheet);
+    }
 }
 
 // Adds a layer's sheet to those of the layers before it, and composites the sum of all. `slab` is the number of the slab and pixel among the
@@ -345,16 +363,15 @@ fn layer_sheet_slot(pixels: Pixels, slab: u32) -> u32 {
 fn composite_layer(sheet: vec4f, part: vec2f, image: vec4f, pixels: Pixels, slab: u32) -> Composited {
     var sum = sheet;
     if CHANNELS > 1u {
-        let place = layer_sheet_slot(pixels, slab);
         let round = pixels.thread / THREADS;
         let bit = select(vec4u(0u), vec4u(1u << (slab + 16u * (round % 2u))), vec4u(round / 2u) == PIXELS);
         let is_added = sheet.a > 0.0;
         let is_after_others = any((sheets_of_layers & bit) != vec4u(0u));
         for (var is_read = is_after_others && (is_added || is_last_layer()); is_read; is_read = false) {
-            sum += bitcast<vec4f>(carried[place]);
+            sum += layer_sheet(pixels, slab);
         }
         for (var is_kept = is_added && !is_last_layer(); is_kept; is_kept = false) {
-            carried[place] = bitcast<vec4u>(sum);
+            keep_layer_sheet(pixels, slab, sum);
         }
         sheets_of_layers |= select(vec4u(0u), bit, is_added);
     }

@@ -62,6 +62,8 @@ pub struct PlaneMode {
     pub gradient: Gradient,
     /// Whether coefficients differ from the values.
     pub exact: bool,
+    /// The number of layers, one for each channel that shares sheets (SPEC §10).
+    pub layers: u32,
     /// Whether voxels of any channel have colours of their own.
     pub own_colors: bool,
 }
@@ -265,6 +267,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
                 ("OWN_COLORS", flag(planes.own_colors)),
                 ("SUMS", f64::from(planes.sums())),
                 ("SAVED", f64::from(planes.sums() * SHEETS * PATCH_THREADS)),
+                ("LAYER_SHEETS", f64::from(planes.layer_sheets())),
                 ("QUEUE_COLORS", f64::from(if planes.own_colors { queue(device, mode) } else { 1 })),
             ]);
             shaders::GATHER_PLANES
@@ -302,12 +305,17 @@ impl PlaneMode {
         };
         of_values + if self.own_colors { 4 } else { 0 }
     }
+
+    /// The number of colours of a group's first sheet at a patch's pixels that layers are added up in, if there are several.
+    fn layer_sheets(&self) -> u32 {
+        if self.layers > 1 { 4 * PATCH_THREADS } else { 1 }
+    }
 }
 
-/// The workgroup memory in bytes of a patch's pixels: four sheets of a colour, or the sums on four planes.
+/// The workgroup memory in bytes of a patch's pixels: four sheets of a colour; or the sums on four planes, and the first sheet of all layers.
 fn pixel_bytes(planes: Option<PlaneMode>) -> u32 {
-    let sums = planes.map_or(4, |planes| planes.sums());
-    sums * SHEETS * PATCH_THREADS * size_of::<[f32; 4]>() as u32
+    let (sums, others) = planes.map_or((4, 0), |planes| (planes.sums(), planes.layer_sheets()));
+    (sums * SHEETS * PATCH_THREADS + others) * size_of::<[f32; 4]>() as u32
 }
 
 /// The bytes of a voxel in the queue: point, amount and blocks, and a colour of its own.

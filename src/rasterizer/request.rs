@@ -213,7 +213,7 @@ fn records(stored: &[Stored]) -> u32 {
     stored.len() as u32 + colored(stored)
 }
 
-/// The records of a pixel's sheets that tiles add up over channels: one for each slab of a sheet group, if there are several channels.
+/// The records of a pixel's sheets that tiles add up over channels, if there are several: one for each slab of a sheet group after the first.
 fn sheet_records(stored: &[Stored]) -> u32 {
-    if stored.len() > 1 { SHEETS } else { 0 }
+    if stored.len() > 1 { SHEETS - 1 } else { 0 }
 }

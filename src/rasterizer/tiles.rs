@@ -433,7 +433,12 @@ fn drawn(request: &FrameRequest) -> Range<i32> {
 /// What is gathered on planes, if classification comes after splatting.
 fn plane_mode(request: &FrameRequest) -> Option<PlaneMode> {
     let After { gradient, needs, .. } = request.after.as_ref()?;
-    Some(PlaneMode { gradient: *gradient, exact: needs.coefficients.is_some(), own_colors: request.colored() > 0 })
+    Some(PlaneMode {
+        gradient: *gradient,
+        exact: needs.coefficients.is_some(),
+        layers: layer_count(request),
+        own_colors: request.colored() > 0,
+    })
 }
 
 /// Checks that a patch's pixels fit into a workgroup's memory, of which sums with the kernel's gradient need most.

@@ -473,10 +473,8 @@ fn memory_grows_with_the_channels() {
         let used = [1, 2, 3, 4].map(|count| used_by(&volume, count));
         let what =
             format!("{classification:?} {compositing:?} by {rasterizer:?}: {used:?} bytes, channels alone {alone:?}");
-        // The buffers that join images come with the second channel, and so do the sheets that tiles add up over channels: one for each of a group's slabs.
-        let pixels = 32 * 32;
-        let adds_sheets = classification == Classification::After && rasterizer == Rasterizer::Tiles;
-        let joined = 20 * pixels + 1024 + if adds_sheets { 4 * 16 * pixels } else { 0 };
+        // The buffers that join images come with the second channel.
+        let joined = 20 * 32 * 32 + 1024;
         for (count, &used_by) in (1..).zip(&used) {
             assert!(used_by <= alone[..count].iter().sum::<u64>() + joined, "{what}");
         }
