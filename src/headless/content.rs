@@ -14,7 +14,7 @@ use crate::settings::window::Region;
 const NO_NUMBER: f32 = 1e30;
 
 /// The compositing buffer's pixels in a region of a frame that was submitted. If the compositing has them choose values (SPEC §9), `chosen`, also
-/// the values.
+/// the values; of means the own colours, if voxels have any, in place of classified ones.
 ///
 /// # Errors
 /// If the device is lost.
@@ -30,8 +30,9 @@ pub(super) fn content(
         let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, buffer)?);
         crop(&pixels, (frame, band.band.first_row), region, &mut colors);
     }
-    let extremes = match frame.first_drawing().and_then(Drawing::carried) {
-        Some(carried) if chosen.is_some() => extremes((device, queue), frame, carried, region, &colors)?,
+    let extremes = match (chosen, frame.first_drawing().and_then(Drawing::carried)) {
+        (Some(Compositing::Average), Some(carried)) => means((device, queue), frame, carried, region, &mut colors)?,
+        (Some(_), Some(carried)) => extremes((device, queue), frame, carried, region, &colors)?,
         _ => Vec::new(),
     };
     if chosen == Some(Compositing::Minimum) {
@@ -50,22 +51,60 @@ fn crop<T: Copy>(pixels: &[T], (frame, first_row): (&PreparedFrame, u32), region
     }
 }
 
-/// The values that the pixels of a region chose in a volume of one channel, by what they carry and their colours.
-fn extremes(
+/// The records that the pixels of a region carry in a volume of one channel, and those of its own colours, if it has any.
+fn records(
     (device, queue): (&Device, &Queue),
     frame: &PreparedFrame,
-    Carried { bands, range: [low, high], .. }: &Carried,
+    carried: &Carried,
+    region: &Region,
+) -> Result<[Vec<[u32; 4]>; 2], RenderError> {
+    let mut records = [const { Vec::new() }; 2];
+    for (band, buffer) in frame.compositing.bands.iter().zip(&carried.bands) {
+        let words: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, buffer)?);
+        // The buffer may be larger than the band's records.
+        let size = band.band.rows as usize * frame.compositing.size[0] as usize;
+        let of_band = words.chunks_exact(size).take(carried.records as usize);
+        for (words, record) in of_band.zip(&mut records) {
+            crop(words, (frame, band.band.first_row), region, record);
+        }
+    }
+    Ok(records)
+}
+
+/// The mean values of a region's pixels. Pixels with points on planes get their own colours, or none.
+fn means(
+    device: (&Device, &Queue),
+    frame: &PreparedFrame,
+    carried: &Carried,
+    region: &Region,
+    colors: &mut [[f32; 4]],
+) -> Result<Vec<Extreme>, RenderError> {
+    let [held, own] = records(device, frame, carried, region)?;
+    let numbers = &carried.numbers;
+    let mut own = own.into_iter();
+    let mean = |([_, sum, count, _], color): ([u32; 4], &mut [f32; 4])| {
+        let [sum, count] = [sum, count].map(f32::from_bits);
+        let own = own.next().unwrap_or_default();
+        if count > 0.0 {
+            *color = own.map(|sum| f32::from_bits(sum) / count);
+            let value = numbers.base + f64::from(sum) / f64::from(count) / numbers.scale;
+            return Extreme { value: value as f32, counted: Extreme::MIDDLE + count };
+        }
+        Extreme { value: 0.0, counted: if color[3] == 0.0 { 0.0 } else { Extreme::MIDDLE } }
+    };
+    Ok(held.into_iter().zip(colors).map(mean).collect())
+}
+
+/// The values that the pixels of a region chose in a volume of one channel, by what they carry and their colours.
+fn extremes(
+    device: (&Device, &Queue),
+    frame: &PreparedFrame,
+    carried: &Carried,
     region: &Region,
     colors: &[[f32; 4]],
 ) -> Result<Vec<Extreme>, RenderError> {
-    let mut held = Vec::with_capacity(region.pixels());
-    for (band, buffer) in frame.compositing.bands.iter().zip(bands) {
-        let bytes = readback::buffer(device, queue, buffer)?;
-        // The buffer may be larger than the band.
-        let size = band.band.rows as usize * frame.compositing.size[0] as usize;
-        let words: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&bytes[..size * size_of::<[f32; 4]>()]);
-        crop(&words, (frame, band.band.first_row), region, &mut held);
-    }
+    let [held, _] = records(device, frame, carried, region)?;
+    let [low, high] = carried.numbers.range;
     let span = if high > low { high - low } else { 1.0 };
     let extreme = |([.., bits], color): ([u32; 4], &[f32; 4])| match f32::from_bits(bits ^ NO_NUMBER.to_bits()) {
         NO_NUMBER if color[3] == 0.0 => Extreme::default(),

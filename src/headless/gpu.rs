@@ -158,7 +158,7 @@ impl GpuHeadless {
         let counts = view.counts();
         let frame = view.frame.as_ref().ok_or_else(no_frame)?;
         let Splatting { compositing, classification, .. } = view.scene.splatting;
-        let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum);
+        let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average);
         let chosen = (is_choice && classification == Classification::After).then_some(compositing);
         let content = content::content((&self.device, &self.queue), frame, &window.region, chosen)?;
         let stats = self.stats(view, counts, 0, [prepare_ms, milliseconds_since(start)])?;

@@ -9,9 +9,10 @@ const HAIR_OF_RANGE: f32 = 2e-6;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Content {
     /// The compositing buffer: premultiplied RGBA. For the sums of `xray` and `average` it is not clamped; for `minimum` (classified before
-    /// splatting) alpha is 2 less the opacity, and 0 where nothing counted.
+    /// splatting) alpha is 2 less the opacity, and 0 where nothing counted. For `average` classified after splatting, pixels with points on planes have the
+    /// mean of these points' own colours and A, or nothing.
     pub colors: Vec<[f32; 4]>,
-    /// For `maximum` and `minimum` classified after splatting, the value that every pixel chose; otherwise empty.
+    /// For `maximum`, `minimum` and `average` classified after splatting, the value that every pixel chose; otherwise empty.
     pub extremes: Vec<Extreme>,
 }
 
@@ -19,10 +20,10 @@ pub struct Content {
 #[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Extreme {
-    /// The value's place in the range of the field's coefficients, from 0 to 1.
+    /// The value's place in the range of the field's coefficients, from 0 to 1; for `average` the mean value itself.
     pub value: f32,
-    /// [`Self::POINT`] for a point on a plane, [`Self::MIDDLE`] for the middle of the visible stretch, which counts where no plane has a
-    /// point, and 0 if nothing counted.
+    /// [`Self::POINT`] for a point on a plane, and for `average` 1 more for each further one; [`Self::MIDDLE`] for the middle of the visible stretch, which
+    /// counts where no plane has a point, and 0 if nothing counted.
     pub counted: f32,
 }
 
@@ -43,8 +44,8 @@ pub(super) struct Rule {
 impl Rule {
     /// Whether pixels carry extremes.
     pub(super) fn has_extremes(self) -> bool {
-        let is_extreme = matches!(self.compositing, Compositing::Maximum | Compositing::Minimum);
-        is_extreme && self.classification == Classification::After
+        let is_choice = matches!(self.compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average);
+        is_choice && self.classification == Classification::After
     }
 
     /// Merges the slabs behind some slabs into them.
@@ -52,7 +53,13 @@ impl Rule {
         if self.has_extremes() {
             let chosen = front.extremes.iter_mut().zip(&back.extremes);
             for ((front, back), (chosen, other)) in front.colors.iter_mut().zip(&back.colors).zip(chosen) {
-                if self.is_better(*other, *chosen) {
+                let [points, further] = [*chosen, *other].map(|of| of.counted - Extreme::MIDDLE);
+                if self.compositing == Compositing::Average && points > 0.0 && further > 0.0 {
+                    let share = f64::from(further) / f64::from(points + further);
+                    let mean = |a: f32, b: f32| (f64::from(a) + (f64::from(b) - f64::from(a)) * share) as f32;
+                    *front = std::array::from_fn(|channel| mean(front[channel], back[channel]));
+                    *chosen = Extreme { value: mean(chosen.value, other.value), counted: chosen.counted + further };
+                } else if self.is_better(*other, *chosen) {
                     (*front, *chosen) = (*back, *other);
                 }
             }

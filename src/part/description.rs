@@ -2,12 +2,15 @@
 
 use std::path::Path;
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::mean::{MeanTables, shows_means};
 use super::{Identity, Part};
 use crate::image::ImageError;
 use crate::image::open::content;
 use crate::scene::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
+use crate::settings::transfer_function::{Ramp, check_iso_ranges, check_ramps};
 use crate::settings::window::{Region, Window};
 
 /// The version of the description.
@@ -34,6 +37,44 @@ struct Description {
     classification: String,
     order: String,
     background: [f64; 4],
+    /// For `average` classified after splatting.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    mean: Option<Mean>,
+}
+
+/// The tables of means: control points over values.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Mean {
+    color: Vec<(f64, [f64; 3])>,
+    opacity: Vec<(f64, f64)>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    iso_ranges: Option<Vec<[f64; 2]>>,
+    has_colors: bool,
+}
+
+impl From<&MeanTables> for Mean {
+    fn from(tables: &MeanTables) -> Self {
+        Self {
+            color: tables.color.points().iter().map(|(value, rgb)| (*value, rgb.to_array())).collect(),
+            opacity: tables.opacity.points().to_vec(),
+            iso_ranges: tables.iso_ranges.clone(),
+            has_colors: tables.has_colors,
+        }
+    }
+}
+
+impl Mean {
+    /// The tables, if they are ones of a transfer function.
+    fn tables(self) -> Result<MeanTables, String> {
+        let Self { color, opacity, iso_ranges, has_colors } = self;
+        let color = color.into_iter().map(|(value, rgb)| (value, DVec3::from(rgb))).collect();
+        let color = Ramp::new(color).map_err(|error| format!("color: {error}"))?;
+        let opacity = Ramp::new(opacity).map_err(|error| format!("opacity: {error}"))?;
+        let checked = check_ramps("mean", Some(&color), Some(&opacity), None);
+        checked.and_then(|()| check_iso_ranges("mean", iso_ranges.as_deref())).map_err(|error| error.to_string())?;
+        Ok(MeanTables { color, opacity, iso_ranges, has_colors })
+    }
 }
 
 /// The JSON text of a part.
@@ -51,6 +92,7 @@ pub(super) fn to_json(part: &Part) -> serde_json::Result<String> {
         classification: name_of(CLASSIFICATIONS, identity.classification).to_owned(),
         order: name_of(ORDERS, identity.order).to_owned(),
         background: identity.background,
+        mean: identity.mean.as_ref().map(Mean::from),
     })
 }
 
@@ -59,7 +101,8 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), I
     let invalid = |key: &str, found: String, allowed: &str| content(path, key, found, allowed.to_owned());
     let description: Description = serde_json::from_str(text)
         .map_err(|error| invalid("part", error.to_string(), "the description that sheetsplat render writes"))?;
-    let Description { version, size, region: [x, y, width, height], slabs, scene_slabs, background, .. } = description;
+    let Description { version, size, region: [x, y, width, height], slabs, scene_slabs, background, mean, .. } =
+        description;
     if version != VERSION {
         return Err(invalid("part.version", version.to_string(), &VERSION.to_string()));
     }
@@ -82,9 +125,19 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), I
         let allowed = format!("X,Y,W,H of at least one pixel within the image of {}×{}", size[0], size[1]);
         return Err(invalid("part.region", region.to_string(), &allowed));
     }
+    let compositing = choice(path, "part.compositing", COMPOSITINGS, &description.compositing)?;
+    let classification = choice(path, "part.classification", CLASSIFICATIONS, &description.classification)?;
+    let shows_means = shows_means(compositing, classification);
+    if mean.is_some() != shows_means {
+        let found = if shows_means { "none" } else { "tables" };
+        let allowed = "tables where compositing is \"average\" and classification \"after\", and only there";
+        return Err(invalid("part.mean", found.to_owned(), allowed));
+    }
+    let mean = mean.map(Mean::tables).transpose();
     let identity = Identity {
-        compositing: choice(path, "part.compositing", COMPOSITINGS, &description.compositing)?,
-        classification: choice(path, "part.classification", CLASSIFICATIONS, &description.classification)?,
+        compositing,
+        classification,
+        mean: mean.map_err(|found| invalid("part.mean", found, "tables of a transfer function"))?,
         order: choice(path, "part.order", ORDERS, &description.order)?,
         fingerprint: description.scene,
         size,

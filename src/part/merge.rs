@@ -113,7 +113,11 @@ impl Image {
         let resolver = Resolver::new(identity.compositing, identity.classification, identity.background);
         let mut image = Self { width, height, pixels: vec![[0.0; 4]; width as usize * height as usize] };
         for (region, parts) in regions {
-            let merged = merge_slabs(parts, &identity, region)?;
+            let mut merged = merge_slabs(parts, &identity, region)?;
+            if let Some(tables) = &identity.mean {
+                let means = merged.colors.iter_mut().zip(&merged.extremes);
+                means.for_each(|(color, mean)| *color = tables.pixel(*color, *mean));
+            }
             let rows = merged.colors.chunks_exact(region.width as usize);
             for (row, y) in rows.zip(region.rows()) {
                 let pixels = &mut image.pixels[y * width as usize..][region.columns()];

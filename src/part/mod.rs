@@ -30,6 +30,7 @@ mod exr;
 #[cfg(feature = "codecs")]
 mod file;
 mod fingerprint;
+mod mean;
 mod merge;
 #[cfg(feature = "codecs")]
 mod npz;
@@ -39,6 +40,7 @@ mod split;
 use std::ops::Range;
 
 pub use content::{Content, Extreme};
+pub use mean::MeanTables;
 pub use merge::MergeError;
 #[cfg(feature = "cpu")]
 pub(crate) use resolve::Resolver;
@@ -85,6 +87,8 @@ pub struct Identity {
     pub order: Order,
     /// Straight-alpha RGBA.
     pub background: [f64; 4],
+    /// For `average` classified after splatting, what classifies the means.
+    pub mean: Option<MeanTables>,
 }
 
 impl Part {
@@ -117,6 +121,7 @@ impl Identity {
             classification: scene.classification(volume.sample()),
             order: scene.splatting.order,
             background: scene.image.background,
+            mean: MeanTables::of(volume, scene),
         })
     }
 
@@ -146,8 +151,10 @@ pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(
         let found = format!("{} for a part of an image", economy.value);
         return Err(SettingError::new(economy.key, found, economy.off.to_string()));
     }
-    if splatting.compositing == Compositing::Average && classification == Classification::After {
-        let found = "\"average\" with splatting.classification = \"after\" for a part of an image";
+    // Which label's table classifies a mean, the whole ray decides.
+    let has_tables = volume.labels().is_some() && !scene.resolve(volume).labels.is_empty();
+    if mean::shows_means(splatting.compositing, classification) && has_tables {
+        let found = "\"average\" with splatting.classification = \"after\" and tables of labels for a part of an image";
         return Err(SettingError::new("splatting.compositing", found, "another compositing, or \"before\" with it"));
     }
     let Range { start, end } = window.slabs;

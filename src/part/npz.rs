@@ -17,12 +17,16 @@ const PIXELS: &str = "pixels.npy";
 const DESCRIPTION: &str = "part.json";
 
 /// The maximum length of a description in bytes.
-const MAX_DESCRIPTION: u64 = 1 << 16;
+const MAX_DESCRIPTION: u64 = 1 << 20;
 
 /// The bytes of a part's file.
 pub(super) fn encode(path: &Path, part: &Part) -> Result<Vec<u8>, ImageError> {
     let failed = |source: std::io::Error| ImageError::Io { path: path.to_owned(), source };
     let json = to_json(part).map_err(|error| failed(error.into()))?;
+    if json.len() as u64 > MAX_DESCRIPTION {
+        let found = format!("{} bytes, of which tables are the most", json.len());
+        return Err(content(path, DESCRIPTION, found, format!("at most {MAX_DESCRIPTION}, or a file .exr")));
+    }
     let (region, channels) = (part.window.region, to_channels(part));
     let shape = [u64::from(region.height), u64::from(region.width), channels.len() as u64];
     let pixels = (0..region.pixels()).flat_map(|at| channels.iter().map(move |channel| channel[at]));

@@ -3,6 +3,7 @@
 use wgpu::{Buffer, BufferUsages, CommandEncoder};
 
 use super::FrameInputs;
+use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, grown};
 use crate::gpu::layout::Band;
@@ -14,10 +15,12 @@ use crate::rasterizer::request::FrameRequest;
 pub(crate) struct Carried {
     /// One buffer for every band of the compositing buffer.
     pub(crate) bands: Vec<Buffer>,
+    /// The records of a pixel.
+    pub(crate) records: u32,
     /// The bytes of each that a frame starts without.
     cleared: Vec<u64>,
-    /// The minimum and maximum number of the first channel's coefficients.
-    pub(crate) range: [f32; 2],
+    /// The map from values to numbers in the first channel, with the range of its coefficients.
+    pub(crate) numbers: Normalization,
 }
 
 impl Carried {
@@ -27,14 +30,19 @@ impl Carried {
     /// If they exceed the device's maximum size of buffers.
     pub(crate) fn prepare(
         FrameInputs { device, request, .. }: FrameInputs<'_>,
-        range: [f32; 2],
+        numbers: Normalization,
         further: u32,
         old: Option<Self>,
     ) -> Result<Self, RenderError> {
         let mut old = old.map(|old| old.bands).unwrap_or_default().into_iter();
         let bands =
             Self::specs(request, further).map(|spec| grown(device, old.next(), &spec)).collect::<Result<_, _>>()?;
-        Ok(Self { bands, cleared: Self::specs(request, 0).map(|spec| spec.size).collect(), range })
+        Ok(Self {
+            bands,
+            records: request.records(),
+            cleared: Self::specs(request, 0).map(|spec| spec.size).collect(),
+            numbers,
+        })
     }
 
     /// The specs of the buffers.

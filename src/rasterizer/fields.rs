@@ -119,7 +119,7 @@ impl FieldRasterizer {
         let (groups, bucketed) = SheetGroups::prepare(inputs, settings, &self.tiles, group_bytes, old_groups)?;
         let channels = Self::prepare_channels(inputs, after, &groups, old_channels)?;
         let lists = self.prepare_lists(inputs, after, (&groups, &channels), old_lists)?;
-        let carried = Carried::prepare(inputs, after.numbers[0].range, 0, old_carried)?;
+        let carried = Carried::prepare(inputs, after.numbers[0], 0, old_carried)?;
         self.field.prepare(device, after.gradient);
         let SheetGroups { targets, tile_lists, .. } = &groups;
         let colors = self.colors.get().filter(|_| request.colored() > 0);

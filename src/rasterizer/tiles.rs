@@ -96,9 +96,7 @@ impl TileRasterizer {
             None => None,
         };
         let carried = match &request.after {
-            Some(after) => {
-                Some(Carried::prepare(inputs, after.numbers[0].range, request.sheet_records(), old_carried)?)
-            }
+            Some(after) => Some(Carried::prepare(inputs, after.numbers[0], request.sheet_records(), old_carried)?),
             None => None,
         };
         let bands = self.bind(inputs, &binned.bins, (&buffers, carried.as_ref()), coefficients);

@@ -88,10 +88,6 @@ fn what_has_no_parts_is_refused() {
             "splatting.method: found \"axis-aligned\" for a part",
         ),
         ("-o part.exr --slabs 0..3 --annotate scale", "--annotate: found it with --slabs or --region"),
-        (
-            "-o part.exr --slabs 0..3 --set splatting.compositing=average --set splatting.classification=after",
-            "splatting.compositing: found \"average\" with splatting.classification = \"after\" for a part",
-        ),
         ("-o part.exr --slabs 3..0", "A..B"),
         ("-o part.exr --region 1,2,3", "X,Y,W,H"),
         ("-o part.exr --overwrite", "--overwrite"),

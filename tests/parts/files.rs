@@ -34,10 +34,11 @@ fn files_hold_all_of_a_part() {
         (Compositing::Linear, Classification::Before),
         (Compositing::Minimum, Classification::Before),
         (Compositing::Maximum, Classification::After),
+        (Compositing::Average, Classification::After),
     ] {
         let parts = parts_of(compositing, classification);
         assert_eq!(parts.len(), 8);
-        let has_extremes = |part: &Part| part.content.extremes.iter().any(|extreme| extreme.counted == Extreme::POINT);
+        let has_extremes = |part: &Part| part.content.extremes.iter().any(|extreme| extreme.counted >= Extreme::POINT);
         assert_eq!(parts.iter().all(has_extremes), classification == Classification::After);
         for part in &parts {
             for extension in ["exr", "npz"] {

@@ -7,6 +7,7 @@ mod channels;
 #[path = "../common/mod.rs"]
 mod common;
 mod files;
+mod means;
 mod merging;
 mod scans;
 mod splitting;

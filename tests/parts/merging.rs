@@ -6,7 +6,7 @@ use glam::DVec3;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
 use sheetsplat::scene::{Channel, Scene, VolumeSource};
 use sheetsplat::settings::{
-    Classification, Compositing, Fit, Interpolation, Order, Projection, Ramp, Rasterizer, Region, Splatting, Window,
+    Classification, Compositing, Fit, Interpolation, Order, Projection, Ramp, Rasterizer, Region, Window,
 };
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::{Image, Part};
@@ -68,7 +68,7 @@ pub(crate) fn parts(headless: &Headless, volume: &Arc<Volume>, scene: &Scene, ra
 }
 
 /// Merges some slab ranges of 4 regions, and compares them with the whole image.
-fn compare(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
+pub(crate) fn compare(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
     let headless = headless(backend);
     let whole = headless.render_volume(Arc::clone(volume), scene).unwrap().image;
     let ranges = if backend == Backend::Gpu { 3 } else { 8 };
@@ -112,7 +112,7 @@ fn parts_of_every_compositing_merge() {
 
 #[test]
 fn parts_classified_after_splatting_merge() {
-    for compositing in COMPOSITINGS.into_iter().filter(|compositing| *compositing != Compositing::Average) {
+    for compositing in COMPOSITINGS {
         for (volume, mut scene) in scenes(compositing, Classification::After, 24) {
             // Coefficients reach further than values.
             let is_exact = scene.camera.projection != Projection::Orthographic { height: None };
@@ -173,26 +173,15 @@ fn parts_choose_among_equal_sheets_as_the_whole_does() {
     }
 }
 
-/// Whether tiles draw a scene.
-fn is_drawn_by_tiles(Splatting { compositing, classification, .. }: &Splatting) -> bool {
-    let is_sum = matches!(compositing, Compositing::Linear | Compositing::Exponential | Compositing::Xray);
-    *classification == Classification::Before || is_sum
-}
-
 fn parts_of_the_gpu_merge(rasterizer: Rasterizer, classification: Classification) {
     for compositing in COMPOSITINGS {
-        if (compositing, classification) == (Compositing::Average, Classification::After) {
-            continue;
-        }
         // Every other compositing in perspective, and back to front.
         for (volume, mut scene) in
             scenes(compositing, classification, 24).into_iter().skip(compositing as usize % 2).take(1)
         {
             scene.splatting.rasterizer = rasterizer;
             scene.shading.enabled = !matches!(compositing, Compositing::Minimum | Compositing::Maximum);
-            if rasterizer != Rasterizer::Tiles || is_drawn_by_tiles(&scene.splatting) {
-                compare(Backend::Gpu, &volume, &scene);
-            }
+            compare(Backend::Gpu, &volume, &scene);
         }
     }
 }
@@ -242,9 +231,6 @@ fn parts_of_all_backends_merge() {
 fn parts_of_the_twin_merge() {
     for compositing in COMPOSITINGS {
         for classification in [Classification::Before, Classification::After] {
-            if (compositing, classification) == (Compositing::Average, Classification::After) {
-                continue;
-            }
             let [(volume, scene), _] = scenes(compositing, classification, 24);
             compare(Backend::Reference, &volume, &scene);
         }

@@ -31,7 +31,7 @@ fn head(size: u32, sets: &[&str]) -> (Volume, Scene) {
     (volume, Scene::from_volume(source, &sets).unwrap())
 }
 
-fn streamed(volume: &Volume, store: impl Store + 'static, memory: u64) -> StreamedVolume {
+pub(crate) fn streamed(volume: &Volume, store: impl Store + 'static, memory: u64) -> StreamedVolume {
     store::streamed(Arc::new(store), 0, volume, memory)
 }
 

@@ -54,13 +54,28 @@ impl Chosen {
         self.colors.fill([BLACK; 3]);
     }
 
-    /// The chosen values in the range of the coefficients, row by row (SPEC §11).
-    pub(super) fn extremes(&self, frame: &Frame<'_>, rays: &TileRays) -> Vec<Extreme> {
+    /// The chosen values, row by row (SPEC §11), and in `pixels`, which are classified, the own colours of means, which are not.
+    pub(super) fn extremes(&self, frame: &Frame<'_>, rays: &TileRays, pixels: &mut [[f32; 4]]) -> Vec<Extreme> {
+        let is_average = frame.compositing == Compositing::Average;
+        if is_average {
+            for (at, pixel) in pixels.iter_mut().enumerate() {
+                let (row, column) = (at / COLUMNS, at % COLUMNS);
+                let count = self.best[row].weight[column];
+                if count > 0.0 {
+                    let own = self.colors.get(row).map_or([0.0; 4], |[sums, ..]| sums.map(|sum| sum[column]));
+                    *pixel = own.map(|sum| sum / count);
+                }
+            }
+        }
         let [low, high] = frame.numbers.range;
         let span = if high > low { high - low } else { 1.0 };
         let of = |row: usize, at: usize| {
             let (best, [near, far]) = (&self.best[row], &self.middle[row]);
             let extreme = |number: f32, counted| Extreme { value: (number - low) / span, counted };
+            if best.weight[at] > 0.0 && is_average {
+                let value = frame.value(best.number[at] / best.weight[at]) as f32;
+                return Extreme { value, counted: Extreme::MIDDLE + best.weight[at] };
+            }
             if best.weight[at] > 0.0 {
                 return extreme(best.number[at], Extreme::POINT);
             }

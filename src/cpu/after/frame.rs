@@ -198,13 +198,13 @@ impl<'a> Frame<'a> {
             || TileWalk::new(frames),
             |walk, origin, bricks| {
                 let (buffers, rays, tally) = dispatch!(level, simd => walk.draw(simd, origin, &placed, bricks));
-                let pixels = resolve::tile(first.resolver.as_ref(), buffers);
+                let mut pixels = resolve::tile(first.resolver.as_ref(), buffers);
                 let unit = first.grid.unit();
                 let first_hits = match has_hits {
                     true => first_hit::depths(buffers, rays, &first.rays.rays, origin, unit),
                     false => Vec::new(),
                 };
-                let extremes = if has_extremes { walk.extremes() } else { Vec::new() };
+                let extremes = if has_extremes { walk.extremes(&mut pixels) } else { Vec::new() };
                 Tile { pixels, extremes, first_hits, tally }
             },
         );

@@ -95,9 +95,9 @@ impl<'a> TileWalk<'a> {
         (&self.buffers, &self.rays, self.tally)
     }
 
-    /// The values that the tile's pixels chose, row by row.
-    pub(super) fn extremes(&self) -> Vec<Extreme> {
-        self.chosen.extremes(self.frame, &self.rays)
+    /// The values that the tile's pixels chose, row by row; see [`Chosen::extremes`].
+    pub(super) fn extremes(&self, pixels: &mut [[f32; 4]]) -> Vec<Extreme> {
+        self.chosen.extremes(self.frame, &self.rays, pixels)
     }
 
     /// Prepares the walk through a tile, which begins with a slab.

@@ -33,6 +33,7 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
     };
     let [min, max] = pixel.frame().field.range();
     let share = if max > min { (value - min) / (max - min) } else { 0.0 };
+    let kept = if compositing == Compositing::Average { value } else { share };
     let tables = pixel.tables(sheet);
     let base = own.map_or_else(|| tables.color.at(value), DVec4::truncate);
     let opacity = own.map_or(1.0, |own| own.w);
@@ -44,7 +45,7 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
         shading::color(&scene.shading, base, gradient, pixel.to_eye()).extend(1.0) * alpha * opacity
     };
     let first_hit = pixel.frame().host.first_hit.filter(|&opacity| color.w >= opacity).map(|_| sheet);
-    Composited { color, first_hit, extreme: Extreme { value: share as f32, counted } }
+    Composited { color, first_hit, extreme: Extreme { value: kept as f32, counted }, own }
 }
 
 /// The planes' points within the stretch that have a value, of those that are drawn, each as plane and value. The plane before a slab belongs
@@ -81,7 +82,8 @@ fn average(pixel: &Pixel) -> Option<Point> {
     let stretch = pixel.stretch();
     let sheet = (stretch.start + stretch.end) / 2.0;
     let own = points(pixel).map(|(plane, _)| pixel.color(plane)).sum::<Option<DVec4>>().map(|sum| sum / count);
-    Some(Point { sheet, value: sum / count, gradient: DVec3::ZERO, own, counted: Extreme::POINT })
+    let counted = Extreme::MIDDLE + count as f32;
+    Some(Point { sheet, value: sum / count, gradient: DVec3::ZERO, own, counted })
 }
 
 /// If the stretch contains no plane's value: the point in its middle, on the line of values of the slab there.

@@ -32,7 +32,7 @@ use super::{Areas, Buffer, Culled, Geometry, Host, resolve};
 use crate::error::RenderError;
 use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
-use crate::part::Content;
+use crate::part::{Content, Extreme};
 use crate::scene::Scene;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
@@ -179,9 +179,13 @@ pub(super) fn part(
     let mut frames = Frame::of_channels(Host::default(), volume, transfer, scene)?;
     frames.iter_mut().for_each(|frame| frame.slabs = slabs.clone());
     let pixels = composite(&frames, region);
-    let colors = pixels.iter().map(|pixel| pixel.color.as_vec4().to_array()).collect();
-    let is_extreme = matches!(scene.splatting.compositing, Compositing::Maximum | Compositing::Minimum);
-    let extremes = pixels.iter().filter(|_| is_extreme).map(|pixel| pixel.extreme).collect();
+    let compositing = scene.splatting.compositing;
+    let is_mean = |pixel: &Composited| compositing == Compositing::Average && pixel.extreme.counted > Extreme::MIDDLE;
+    // Means are classified where parts are merged.
+    let color = |pixel: &Composited| if is_mean(pixel) { pixel.own.unwrap_or_default() } else { pixel.color };
+    let colors = pixels.iter().map(|pixel| color(pixel).as_vec4().to_array()).collect();
+    let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average);
+    let extremes = pixels.iter().filter(|_| is_choice).map(|pixel| pixel.extreme).collect();
     Ok(Content { colors, extremes })
 }
 

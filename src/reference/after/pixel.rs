@@ -69,14 +69,16 @@ pub struct Composited {
     pub color: DVec4,
     /// The position in sheets at which the host's opacity is reached.
     pub first_hit: Option<f64>,
-    /// For `maximum` and `minimum` the value that was chosen (SPEC §11).
+    /// For `maximum`, `minimum` and `average` the value that was chosen (SPEC §11).
     pub extreme: Extreme,
+    /// Its own colour and A, if voxels have their own.
+    pub own: Option<DVec4>,
 }
 
 impl Composited {
     /// A pixel that does not choose one value.
     pub(super) fn new(color: DVec4, first_hit: Option<f64>) -> Self {
-        Self { color, first_hit, extreme: Extreme::default() }
+        Self { color, first_hit, extreme: Extreme::default(), own: None }
     }
 }
 

@@ -1,0 +1,60 @@
+//! `average` after splatting (SPEC §9): what pixels' means show. The mean of all values along a ray is classified, so that parts have means, and the
+//! whole image their colours.
+
+use glam::DVec3;
+
+use super::content::Extreme;
+use crate::scene::{OpenVolume, Scene};
+use crate::settings::splatting::{Classification, Compositing};
+use crate::settings::transfer_function::Ramp;
+
+/// The tables that classify the means.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MeanTables {
+    /// Red, green and blue in [0, 1] over values.
+    pub color: Ramp<DVec3>,
+    /// Opacity in [0, 1] over values.
+    pub opacity: Ramp<f64>,
+    /// Closed intervals of the values that take part; `None` means all values.
+    pub iso_ranges: Option<Vec<[f64; 2]>>,
+    /// Whether voxels have colours of their own (SPEC §10), which pixels then carry in place of the colour's.
+    pub has_colors: bool,
+}
+
+impl MeanTables {
+    /// Those of a scene of a volume; `None` unless it shows means.
+    pub(super) fn of(volume: &OpenVolume, scene: &Scene) -> Option<Self> {
+        let sample = volume.sample();
+        if !shows_means(scene.splatting.compositing, scene.classification(sample)) {
+            return None;
+        }
+        let transfer = scene.resolve(sample);
+        let (color, opacity, iso_ranges) = (transfer.color, transfer.opacity, transfer.iso_ranges);
+        Some(Self { color, opacity, iso_ranges, has_colors: sample.colors().is_some() })
+    }
+
+    /// A pixel's colour, premultiplied, given what it carries.
+    pub(super) fn pixel(&self, carried: [f32; 4], mean: Extreme) -> [f32; 4] {
+        // The middle of a stretch is classified where it is drawn.
+        if mean.counted <= Extreme::MIDDLE {
+            return carried;
+        }
+        let value = f64::from(mean.value);
+        let is_in =
+            self.iso_ranges.as_ref().is_none_or(|ranges| ranges.iter().any(|&[lo, hi]| lo <= value && value <= hi));
+        if !is_in {
+            return [0.0; 4];
+        }
+        let opacity = self.opacity.at(value);
+        if self.has_colors {
+            let [red, green, blue, alpha] = carried.map(f64::from);
+            return [red, green, blue, 1.0].map(|channel| (channel * alpha * opacity) as f32);
+        }
+        self.color.at(value).extend(1.0).to_array().map(|channel| (channel * opacity) as f32)
+    }
+}
+
+/// Whether pixels show the mean of the values along their rays.
+pub(super) fn shows_means(compositing: Compositing, classification: Classification) -> bool {
+    (compositing, classification) == (Compositing::Average, Classification::After)
+}
