@@ -105,6 +105,11 @@ impl CpuRenderer {
         Ok(Self { volume, scene, transfer, layers, simd, level, first_hit: None, surfaces: None, hits: None })
     }
 
+    /// The volume that is drawn.
+    pub(crate) fn volume(&self) -> &Arc<Volume> {
+        &self.volume
+    }
+
     /// The settings.
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -248,6 +253,7 @@ impl CpuRenderer {
     /// As for [`Self::draw`], if the scene has no parts, a host has set surfaces, or the window does not lie in the image.
     pub fn draw_part(&mut self, window: &Window) -> Result<(Part, Stats), RenderError> {
         let start = Instant::now();
+        part::check_sheets(&self.volume, &self.scene)?;
         part::check(&self.volume, &self.scene, window)?;
         if self.surfaces.is_some() {
             return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());

@@ -127,6 +127,7 @@ impl GpuHeadless {
     /// # Errors
     /// As for [`Self::draw`], if the scene has no parts, a host has set surfaces, or the window does not lie in the image.
     pub fn draw_part(&self, view: &mut SceneView, window: &Window) -> Result<(Part, Stats), RenderError> {
+        part::check_sheets(view.volume.volume(), &view.scene)?;
         part::check(view.volume.volume(), &view.scene, window)?;
         if view.surfaces.is_some() {
             return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());

@@ -11,6 +11,7 @@ mod driver;
 mod error;
 #[cfg(feature = "gpu")]
 mod gpu;
+mod joined;
 mod options;
 #[cfg(feature = "gpu")]
 pub mod readback;
@@ -32,7 +33,7 @@ use crate::cpu::{CpuRenderer, StreamRenderer};
 use crate::error::RenderError;
 use crate::error::device::DeviceError;
 use crate::error::setting::SettingError;
-use crate::part::{Content, Part};
+use crate::part::{self, Content, Part};
 use crate::pick::Pick;
 pub use crate::rendering::{Backend, Rendering};
 use crate::scene::{OpenVolume, Scene};
@@ -131,6 +132,10 @@ impl Headless {
     /// As for [`Self::draw`], if the scene has no parts, or the window does not lie in the image.
     pub fn draw_part(&self, view: &mut HeadlessView, window: &Window) -> Result<(Part, Stats), RenderError> {
         let reads = view.reads;
+        let volume = view.volume();
+        if part::joining(volume.sample(), view.scene()).is_some() {
+            return joined::draw_part((&volume, view.scene()), window, self);
+        }
         let (part, stats) = match (&self.drawer, view.backend_mut()) {
             #[cfg(feature = "gpu")]
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => gpu.draw_part(view, window),

@@ -40,6 +40,10 @@ impl ReferenceView {
         Ok(Self { scene: scene.classified(&volume), volume, transfer, first_hit: None, hits: None })
     }
 
+    pub(super) fn volume(&self) -> &Arc<Volume> {
+        &self.volume
+    }
+
     pub(super) fn scene(&self) -> &Scene {
         &self.scene
     }

@@ -8,7 +8,7 @@ use crate::cpu::{CpuRenderer, StreamRenderer};
 use crate::error::setting::{Interval, SettingError};
 #[cfg(feature = "gpu")]
 use crate::renderer::scene_view::SceneView;
-use crate::scene::Scene;
+use crate::scene::{OpenVolume, Scene};
 use crate::settings::camera::Camera;
 use crate::stats::StoreCounts;
 
@@ -72,6 +72,20 @@ impl HeadlessView {
             ViewBackend::Stream(view) => view.scene(),
             ViewBackend::Reference(view) => view.scene(),
             ViewBackend::Boxed(view) => view.scene(),
+        }
+    }
+
+    /// The volume.
+    pub(super) fn volume(&self) -> OpenVolume {
+        match &self.backend {
+            #[cfg(feature = "gpu")]
+            ViewBackend::Gpu(view) => view.volume().volume().clone().into(),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Cpu(view) => view.volume().clone().into(),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Stream(view) => OpenVolume::Streamed(view.volume().clone()),
+            ViewBackend::Reference(view) => view.volume().clone().into(),
+            ViewBackend::Boxed(view) => OpenVolume::Streamed(view.volume().clone()),
         }
     }
 

@@ -34,6 +34,14 @@ impl Extreme {
     pub const MIDDLE: f32 = 1.0;
 }
 
+impl Content {
+    /// Pixels that show nothing, with extremes or without.
+    pub(crate) fn empty(pixels: usize, has_extremes: bool) -> Self {
+        let extremes = vec![Extreme::default(); if has_extremes { pixels } else { 0 }];
+        Self { colors: vec![[0.0; 4]; pixels], extremes }
+    }
+}
+
 /// The rule by which consecutive slab ranges merge.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rule {

@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::mean::{MeanTables, shows_means};
 use super::{Identity, Part};
 use crate::image::ImageError;
+use crate::image::channels::Joining;
 use crate::image::open::content;
 use crate::scene::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
 use crate::settings::transfer_function::{Ramp, check_iso_ranges, check_ramps};
@@ -15,6 +16,9 @@ use crate::settings::window::{Region, Window};
 
 /// The version of the description.
 const VERSION: u32 = 1;
+
+/// The most images of channels.
+const MAX_IMAGES: usize = 256;
 
 /// The largest image, pixels along a side, as on the native backend.
 const MAX_SIZE: u32 = 32_768;
@@ -37,9 +41,20 @@ struct Description {
     classification: String,
     order: String,
     background: [f64; 4],
-    /// For `average` classified after splatting.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    mean: Option<Mean>,
+    /// Not where there is one.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    images: usize,
+    /// For `average` classified after splatting, of every image.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    means: Vec<Mean>,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn is_one(count: &usize) -> bool {
+    *count == 1
 }
 
 /// The tables of means: control points over values.
@@ -92,7 +107,8 @@ pub(super) fn to_json(part: &Part) -> serde_json::Result<String> {
         classification: name_of(CLASSIFICATIONS, identity.classification).to_owned(),
         order: name_of(ORDERS, identity.order).to_owned(),
         background: identity.background,
-        mean: identity.mean.as_ref().map(Mean::from),
+        images: identity.images,
+        means: identity.means.iter().map(Mean::from).collect(),
     })
 }
 
@@ -101,8 +117,8 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), I
     let invalid = |key: &str, found: String, allowed: &str| content(path, key, found, allowed.to_owned());
     let description: Description = serde_json::from_str(text)
         .map_err(|error| invalid("part", error.to_string(), "the description that sheetsplat render writes"))?;
-    let Description { version, size, region: [x, y, width, height], slabs, scene_slabs, background, mean, .. } =
-        description;
+    let Description { version, size, region: [x, y, width, height], slabs, scene_slabs, background, .. } = description;
+    let Description { images, means, .. } = description;
     if version != VERSION {
         return Err(invalid("part.version", version.to_string(), &VERSION.to_string()));
     }
@@ -127,17 +143,22 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), I
     }
     let compositing = choice(path, "part.compositing", COMPOSITINGS, &description.compositing)?;
     let classification = choice(path, "part.classification", CLASSIFICATIONS, &description.classification)?;
-    let shows_means = shows_means(compositing, classification);
-    if mean.is_some() != shows_means {
-        let found = if shows_means { "none" } else { "tables" };
-        let allowed = "tables where compositing is \"average\" and classification \"after\", and only there";
-        return Err(invalid("part.mean", found.to_owned(), allowed));
+    let most = if Joining::of(compositing, classification) == Some(Joining::Sum) { MAX_IMAGES } else { 1 };
+    if !(1..=most).contains(&images) {
+        return Err(invalid("part.images", images.to_string(), &format!("1 to {most}")));
     }
-    let mean = mean.map(Mean::tables).transpose();
+    let expected = if shows_means(compositing, classification) { images } else { 0 };
+    if means.len() != expected {
+        let allowed =
+            format!("{expected}: one for each image where compositing is \"average\" and classification \"after\"");
+        return Err(invalid("part.means", format!("{} tables", means.len()), &allowed));
+    }
+    let means: Result<_, _> = means.into_iter().map(Mean::tables).collect();
     let identity = Identity {
         compositing,
         classification,
-        mean: mean.map_err(|found| invalid("part.mean", found, "tables of a transfer function"))?,
+        images,
+        means: means.map_err(|found| invalid("part.means", found, "tables of a transfer function"))?,
         order: choice(path, "part.order", ORDERS, &description.order)?,
         fingerprint: description.scene,
         size,

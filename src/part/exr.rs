@@ -26,7 +26,7 @@ pub(super) fn encode(path: &Path, part: &Part) -> Result<Vec<u8>, ImageError> {
     let failed = |error: Error| ImageError::Io { path: path.to_owned(), source: std::io::Error::other(error) };
     let json = to_json(part).map_err(|error| ImageError::Io { path: path.to_owned(), source: error.into() })?;
     let region = part.window.region;
-    let channel = |(name, samples): (&&str, Vec<f32>)| AnyChannel::new(*name, FlatSamples::F32(samples));
+    let channel = |(name, samples): (&String, Vec<f32>)| AnyChannel::new(name.as_str(), FlatSamples::F32(samples));
     let channels = channel_names(&part.identity).iter().zip(to_channels(part)).map(channel).collect();
     let description = (Text::from(ATTRIBUTE), AttributeValue::Text(Text::from(json.as_str())));
     let attributes = LayerAttributes {
@@ -74,7 +74,7 @@ pub(super) fn decode(path: &Path, bytes: &[u8], access: &Access) -> Result<Decod
     let reader = ::exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
     let image = reader.first_valid_layer().all_attributes().non_parallel();
     let image = image.from_buffered(Cursor::new(bytes)).map_err(failed)?;
-    let channel = |name: &&str| {
+    let channel = |name: &String| {
         let samples = image.layer_data.channel_data.list.iter().find(|channel| channel.name.to_string() == *name);
         match samples.map(|channel| &channel.sample_data) {
             Some(FlatSamples::F32(samples)) if samples.len() == region.pixels() => Ok(samples.clone()),

@@ -71,7 +71,9 @@ impl Part {
     }
 
     fn of_channels(name: String, (identity, window, channels): Decoded) -> Self {
-        Self { name, identity, window, content: from_channels(&channels) }
+        let per_image = channels.len() / identity.images;
+        let contents = channels.chunks(per_image).map(from_channels).collect();
+        Self { name, ..Self::named(identity, window, contents) }
     }
 
     /// Saves the part by the file's extension: `.exr`, whose data window is the region and whose display window is the whole image, with the
@@ -91,10 +93,16 @@ impl Part {
     pub fn encode(&self, path: &Path) -> Result<Vec<u8>, ImageError> {
         let format = Format::of(path)?;
         let pixels = self.window.region.pixels();
-        let extremes = if self.identity.rule().has_extremes() { pixels } else { 0 };
-        if (self.content.colors.len(), self.content.extremes.len()) != (pixels, extremes) {
-            let found = format!("{} and {}", self.content.colors.len(), self.content.extremes.len());
-            return Err(content(path, "pixels", found, format!("{pixels} and {extremes} extremes")));
+        let extremes = if self.identity.has_extremes() { pixels } else { 0 };
+        for of_image in self.contents() {
+            if (of_image.colors.len(), of_image.extremes.len()) != (pixels, extremes) {
+                let found = format!("{} and {}", of_image.colors.len(), of_image.extremes.len());
+                return Err(content(path, "pixels", found, format!("{pixels} and {extremes} extremes")));
+            }
+        }
+        if self.contents().count() != self.identity.images {
+            let (found, allowed) = (self.contents().count().to_string(), self.identity.images.to_string());
+            return Err(content(path, "images of channels", found, allowed));
         }
         match format {
             Format::Exr => exr::encode(path, self),
@@ -103,15 +111,22 @@ impl Part {
     }
 }
 
-/// The names of a part's channels.
-pub(super) fn channel_names(identity: &Identity) -> &'static [&'static str] {
+/// The names of a part's channels: those of images after the first have their numbers before them.
+pub(super) fn channel_names(identity: &Identity) -> Vec<String> {
     const ALL: [&str; 6] = ["R", "G", "B", "A", "value", "counted"];
-    if identity.rule().has_extremes() { &ALL } else { &ALL[..4] }
+    let names = if identity.has_extremes() { &ALL } else { &ALL[..4] };
+    let of_image = |image: usize| {
+        names.iter().map(move |name| if image == 0 { (*name).to_owned() } else { format!("{image}.{name}") })
+    };
+    (0..identity.images).flat_map(of_image).collect()
 }
 
 /// The pixels of a part, channel by channel.
 pub(super) fn to_channels(part: &Part) -> Vec<Vec<f32>> {
-    let Content { colors, extremes } = &part.content;
+    part.contents().flat_map(to_channels_of).collect()
+}
+
+fn to_channels_of(Content { colors, extremes }: &Content) -> Vec<Vec<f32>> {
     let mut channels: Vec<Vec<f32>> =
         (0..4).map(|channel| colors.iter().map(|color| color[channel]).collect()).collect();
     if !extremes.is_empty() {
@@ -121,7 +136,7 @@ pub(super) fn to_channels(part: &Part) -> Vec<Vec<f32>> {
     channels
 }
 
-/// The pixels of a part from its channels, which have equal lengths.
+/// The pixels of one of a part's images from its channels, which have equal lengths.
 fn from_channels(channels: &[Vec<f32>]) -> Content {
     let pixels = channels.first().map_or(0, Vec::len);
     let colors = (0..pixels).map(|at| std::array::from_fn(|channel| channels[channel][at])).collect();

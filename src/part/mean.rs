@@ -4,9 +4,10 @@
 use glam::DVec3;
 
 use super::content::Extreme;
-use crate::scene::{OpenVolume, Scene};
+use crate::scene::Scene;
 use crate::settings::splatting::{Classification, Compositing};
-use crate::settings::transfer_function::Ramp;
+use crate::settings::transfer_function::{Ramp, TransferFunction};
+use crate::volume::Volume;
 
 /// The tables that classify the means.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,15 +23,19 @@ pub struct MeanTables {
 }
 
 impl MeanTables {
-    /// Those of a scene of a volume; `None` unless it shows means.
-    pub(super) fn of(volume: &OpenVolume, scene: &Scene) -> Option<Self> {
-        let sample = volume.sample();
-        if !shows_means(scene.splatting.compositing, scene.classification(sample)) {
-            return None;
+    /// Those of a scene of a volume, for every channel; none unless it shows means.
+    pub(super) fn of(volume: &Volume, scene: &Scene) -> Vec<Self> {
+        if !shows_means(scene.splatting.compositing, scene.classification(volume)) {
+            return Vec::new();
         }
-        let transfer = scene.resolve(sample);
-        let (color, opacity, iso_ranges) = (transfer.color, transfer.opacity, transfer.iso_ranges);
-        Some(Self { color, opacity, iso_ranges, has_colors: sample.colors().is_some() })
+        let transfer = scene.resolve(volume);
+        let of_channel = |(channel, transfer): (&Volume, &TransferFunction)| Self {
+            color: transfer.color.clone(),
+            opacity: transfer.opacity.clone(),
+            iso_ranges: transfer.iso_ranges.clone(),
+            has_colors: channel.colors().is_some(),
+        };
+        volume.channels().zip(transfer.channels()).map(of_channel).collect()
     }
 
     /// A pixel's colour, premultiplied, given what it carries.

@@ -7,6 +7,7 @@ use super::content::Content;
 use super::resolve::Resolver;
 use super::{Identity, Part};
 use crate::image::Image;
+use crate::image::channels::Joining;
 use crate::scene::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
 use crate::settings::window::{Region, Window};
 
@@ -85,7 +86,7 @@ impl Part {
             }
         }
         Ok(match merge_neighbours(parts, identity, *region)? {
-            Some((slabs, content)) => Self::named(identity.clone(), Window { slabs, region: *region }, content),
+            Some((slabs, contents)) => Self::named(identity.clone(), Window { slabs, region: *region }, contents),
             // None of them shows a slab.
             None => first,
         })
@@ -110,22 +111,38 @@ impl Image {
         let (_, identity) = first.ok_or(MergeError::Empty)?;
         check_regions(&regions, identity.size)?;
         let [width, height] = identity.size;
-        let resolver = Resolver::new(identity.compositing, identity.classification, identity.background);
         let mut image = Self { width, height, pixels: vec![[0.0; 4]; width as usize * height as usize] };
         for (region, parts) in regions {
-            let mut merged = merge_slabs(parts, &identity, region)?;
-            if let Some(tables) = &identity.mean {
-                let means = merged.colors.iter_mut().zip(&merged.extremes);
-                means.for_each(|(color, mean)| *color = tables.pixel(*color, *mean));
-            }
-            let rows = merged.colors.chunks_exact(region.width as usize);
-            for (row, y) in rows.zip(region.rows()) {
-                let pixels = &mut image.pixels[y * width as usize..][region.columns()];
-                pixels.iter_mut().zip(row).for_each(|(pixel, acc)| *pixel = resolver.pixel(*acc));
+            let pixels = resolved(merge_slabs(parts, &identity, region)?, &identity);
+            for (row, y) in pixels.chunks_exact(region.width as usize).zip(region.rows()) {
+                image.pixels[y * width as usize..][region.columns()].copy_from_slice(row);
             }
         }
         Ok(image)
     }
+}
+
+/// The pixels of an image of merged slabs.
+fn resolved(contents: Vec<Content>, identity: &Identity) -> Vec<[f32; 4]> {
+    let Identity { compositing, classification, background, means, .. } = identity;
+    let are_joined = contents.len() > 1;
+    let resolver = Resolver::new(*compositing, *classification, if are_joined { [0.0; 4] } else { *background });
+    let of_image = |(number, Content { mut colors, extremes }): (usize, Content)| {
+        if let Some(tables) = means.get(number) {
+            colors.iter_mut().zip(&extremes).for_each(|(color, mean)| *color = tables.pixel(*color, *mean));
+        }
+        colors.iter_mut().for_each(|color| *color = resolver.pixel(*color));
+        colors
+    };
+    let mut images = contents.into_iter().enumerate().map(of_image);
+    let mut pixels = images.next().unwrap_or_default();
+    for image in images {
+        Joining::Sum.join((&mut pixels, &mut [0.0; 0]), (&image, &[]));
+    }
+    if are_joined {
+        Joining::Sum.finish(&mut pixels, *background);
+    }
+    pixels
 }
 
 /// Checks that a part belongs to the image of another one.
@@ -138,6 +155,7 @@ fn check_identity(part: &Part, other: &str, expected: &Identity) -> Result<(), M
             ("classification", name_of(CLASSIFICATIONS, identity.classification).to_owned()),
             ("size", format!("{width}×{height}")),
             ("background", format!("{:?}", identity.background)),
+            ("images of channels", identity.images.to_string()),
             ("scene's slabs", format!("{}..{}", identity.slabs.start, identity.slabs.end)),
             ("scene", identity.fingerprint.clone()),
         ]
@@ -153,7 +171,7 @@ fn check_identity(part: &Part, other: &str, expected: &Identity) -> Result<(), M
 
 /// Checks that a part's pixels fill its region, which lies in the image.
 fn check_content(part: &Part) -> Result<(), MergeError> {
-    let Part { name, identity, window, content } = part;
+    let Part { name, identity, window, .. } = part;
     let wrong =
         |field, found: String, allowed: String| MergeError::Content { part: name.clone(), field, found, allowed };
     if window.region.check(identity.size).is_err() {
@@ -161,10 +179,11 @@ fn check_content(part: &Part) -> Result<(), MergeError> {
         return Err(wrong("region", window.region.to_string(), format!("a region of the image of {width}×{height}")));
     }
     let pixels = window.region.pixels();
-    let extremes = if identity.rule().has_extremes() { pixels } else { 0 };
-    for (field, found, allowed) in
-        [("pixels", content.colors.len(), pixels), ("extremes", content.extremes.len(), extremes)]
-    {
+    let extremes = if identity.has_extremes() { pixels } else { 0 };
+    let images = ("images of channels", part.contents().count(), identity.images);
+    let of_image =
+        |content: &Content| [("pixels", content.colors.len(), pixels), ("extremes", content.extremes.len(), extremes)];
+    for (field, found, allowed) in std::iter::once(images).chain(part.contents().flat_map(of_image)) {
         if found != allowed {
             return Err(wrong(field, found.to_string(), allowed.to_string()));
         }
@@ -202,15 +221,16 @@ fn check_regions(regions: &BTreeMap<Region, Vec<Part>>, [width, height]: [u32; 2
     Ok(())
 }
 
-/// The content of a region, whose parts must show each of the scene's slabs once.
-fn merge_slabs(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Content, MergeError> {
+/// The content of a region for every image that is added up, whose parts must show each of the scene's slabs once.
+fn merge_slabs(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Vec<Content>, MergeError> {
     let scene = &identity.slabs;
-    let Some((slabs, content)) = merge_neighbours(parts, identity, region)? else {
+    let Some((slabs, contents)) = merge_neighbours(parts, identity, region)? else {
         if !scene.is_empty() {
             return Err(missing(scene.clone(), region));
         }
         // A scene without slabs shows nothing.
-        return Ok(Content { colors: vec![[0.0; 4]; region.pixels()], extremes: Vec::new() });
+        let empty = Content::empty(region.pixels(), identity.has_extremes());
+        return Ok(vec![empty; identity.images]);
     };
     if slabs.start > scene.start {
         return Err(missing(scene.start..slabs.start, region));
@@ -218,22 +238,24 @@ fn merge_slabs(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<
     if slabs.end < scene.end {
         return Err(missing(slabs.end..scene.end, region));
     }
-    Ok(content)
+    Ok(contents)
 }
 
 fn missing(Range { start, end }: Range<i32>, region: Region) -> MergeError {
     MergeError::Missing { missing: format!("slabs {start}..{end} of region {region}") }
 }
 
+/// Slabs, and their content for every image that is added up.
+type Merged = (Range<i32>, Vec<Content>);
+
 /// The scene's slabs that parts of a region show without a gap, and their content; nothing if they show none.
 ///
 /// Neighbours merge in pairs, again and again, so that processes that merge pairs get the same bytes.
-fn merge_neighbours(
-    parts: Vec<Part>,
-    identity: &Identity,
-    region: Region,
-) -> Result<Option<(Range<i32>, Content)>, MergeError> {
-    let within = |part: Part| (Window::within(&part.window, &identity.slabs), part.name, part.content);
+fn merge_neighbours(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Option<Merged>, MergeError> {
+    let within = |part: Part| {
+        let slabs = Window::within(&part.window, &identity.slabs);
+        (slabs, part.name, std::iter::once(part.content).chain(part.further).collect())
+    };
     let mut shown: Vec<_> = parts.into_iter().map(within).filter(|(slabs, ..)| !slabs.is_empty()).collect();
     shown.sort_by_key(|(slabs, ..)| (slabs.start, slabs.end));
     for pair in shown.windows(2) {
@@ -246,14 +268,13 @@ fn merge_neighbours(
             return Err(missing(before.end..slabs.start, region));
         }
     }
-    let mut merged: Vec<(Range<i32>, Content)> =
-        shown.into_iter().map(|(slabs, _, content)| (slabs, content)).collect();
+    let mut merged: Vec<Merged> = shown.into_iter().map(|(slabs, _, contents)| (slabs, contents)).collect();
     while merged.len() > 1 {
         let mut rest = merged.into_iter();
         merged = std::iter::from_fn(|| {
             let (mut slabs, mut front) = rest.next()?;
             if let Some((behind, back)) = rest.next() {
-                identity.rule().merge(&mut front, &back);
+                front.iter_mut().zip(&back).for_each(|(front, back)| identity.rule().merge(front, back));
                 slabs.end = behind.end;
             }
             Some((slabs, front))

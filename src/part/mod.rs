@@ -67,6 +67,8 @@ pub struct Part {
     pub window: Window,
     /// Its pixels.
     pub content: Content,
+    /// Where channels share no sheets (SPEC §10) and their images are added up, the pixels of the channels after the first; otherwise empty.
+    pub further: Vec<Content>,
 }
 
 /// What the parts of one image have in common.
@@ -87,8 +89,10 @@ pub struct Identity {
     pub order: Order,
     /// Straight-alpha RGBA.
     pub background: [f64; 4],
-    /// For `average` classified after splatting, what classifies the means.
-    pub mean: Option<MeanTables>,
+    /// The number of images that are added up: that of the channels where these share no sheets, else 1.
+    pub images: usize,
+    /// For `average` classified after splatting, what classifies the means in each of these.
+    pub means: Vec<MeanTables>,
 }
 
 impl Part {
@@ -99,13 +103,21 @@ impl Part {
         window: &Window,
         content: Content,
     ) -> Result<Self, RenderError> {
-        Ok(Self::named(Identity::of((volume, scene), view)?, window.clone(), content))
+        Ok(Self::named(Identity::of((volume, scene), view)?, window.clone(), vec![content]))
     }
 
     /// A part with its slabs and pixels as its name.
-    pub(crate) fn named(identity: Identity, window: Window, content: Content) -> Self {
+    pub(crate) fn named(identity: Identity, window: Window, contents: Vec<Content>) -> Self {
         let Window { slabs: Range { start, end }, region } = &window;
-        Self { name: format!("slabs {start}..{end} of region {region}"), identity, window, content }
+        let name = format!("slabs {start}..{end} of region {region}");
+        let mut contents = contents.into_iter();
+        let (content, further) = (contents.next().unwrap_or_default(), contents.collect());
+        Self { name, identity, window, content, further }
+    }
+
+    /// The pixels of all images that are added up.
+    pub(crate) fn contents(&self) -> impl Iterator<Item = &Content> {
+        std::iter::once(&self.content).chain(&self.further)
     }
 }
 
@@ -121,13 +133,43 @@ impl Identity {
             classification: scene.classification(volume.sample()),
             order: scene.splatting.order,
             background: scene.image.background,
-            mean: MeanTables::of(volume, scene),
+            images: if joining(volume.sample(), scene).is_some() { volume.sample().channels().count() } else { 1 },
+            means: MeanTables::of(volume.sample(), scene),
         })
+    }
+
+    /// Whether pixels carry extremes.
+    pub(crate) fn has_extremes(&self) -> bool {
+        self.rule().has_extremes()
     }
 
     fn rule(&self) -> Rule {
         Rule { compositing: self.compositing, classification: self.classification }
     }
+}
+
+/// How the images of a volume's channels become one; `None` if they share sheets, or there is only one.
+pub(crate) fn joining(volume: &Volume, scene: &Scene) -> Option<Joining> {
+    let joining = Joining::of(scene.splatting.compositing, scene.classification(volume));
+    joining.filter(|_| !volume.further().is_empty())
+}
+
+/// Checks that a renderer, which draws all channels at once, can draw parts of a scene.
+///
+/// # Errors
+/// If channels share no sheets.
+#[cfg(any(feature = "cpu", feature = "gpu"))]
+pub(crate) fn check_sheets(volume: &Volume, scene: &Scene) -> Result<(), SettingError> {
+    if joining(volume, scene).is_none() {
+        return Ok(());
+    }
+    let compositing = crate::scene::names::name_of(crate::scene::names::COMPOSITINGS, scene.splatting.compositing);
+    let found = format!("\"{compositing}\" of several channels for a part of an image");
+    Err(SettingError::new(
+        "splatting.compositing",
+        found,
+        "\"linear\", \"exponential\" or \"xray\", or Headless::draw_part",
+    ))
 }
 
 /// Checks, before anything is drawn, that a scene has parts, and that a window is one.
@@ -136,11 +178,10 @@ impl Identity {
 /// If the scene's method is not image-aligned, an economy is in use, its compositing has no parts, or the window does not lie in the image.
 pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(), SettingError> {
     let (splatting, classification) = (&scene.splatting, scene.classification(volume));
-    if Joining::of(splatting.compositing, classification).is_some() && !volume.further().is_empty() {
-        let compositing = crate::scene::names::name_of(crate::scene::names::COMPOSITINGS, splatting.compositing);
-        let found = format!("\"{compositing}\" of several channels for a part of an image");
-        let allowed = "\"linear\", \"exponential\" or \"xray\"";
-        return Err(SettingError::new("splatting.compositing", found, allowed));
+    if joining(volume, scene) == Some(Joining::Nearest) {
+        // First hits tell which channel is the nearest, and parts do not carry them.
+        let found = "\"surface\" with splatting.classification = \"after\" of several channels for a part of an image";
+        return Err(SettingError::new("splatting.compositing", found, "another compositing, or \"before\" with it"));
     }
     if splatting.method != Method::ImageAligned {
         let method = crate::scene::names::name_of(crate::scene::names::METHODS, splatting.method);
@@ -152,7 +193,9 @@ pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(
         return Err(SettingError::new(economy.key, found, economy.off.to_string()));
     }
     // Which label's table classifies a mean, the whole ray decides.
-    let has_tables = volume.labels().is_some() && !scene.resolve(volume).labels.is_empty();
+    let transfer = scene.resolve(volume);
+    let mut channels = volume.channels().zip(transfer.channels());
+    let has_tables = channels.any(|(channel, of)| channel.labels().is_some() && !of.labels.is_empty());
     if mean::shows_means(splatting.compositing, classification) && has_tables {
         let found = "\"average\" with splatting.classification = \"after\" and tables of labels for a part of an image";
         return Err(SettingError::new("splatting.compositing", found, "another compositing, or \"before\" with it"));

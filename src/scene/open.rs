@@ -38,6 +38,17 @@ impl OpenVolume {
         }
     }
 
+    /// One of its channels by itself.
+    ///
+    /// # Panics
+    /// If it has no such channel.
+    pub(crate) fn of_channel(&self, number: usize) -> Self {
+        match self {
+            Self::Whole(volume) => number.checked_sub(1).map_or(&**volume, |at| &volume.further()[at]).alone().into(),
+            Self::Streamed(volume) => Self::Streamed(volume.of_channel(number)),
+        }
+    }
+
     /// The grid of the voxels that are drawn.
     pub fn grid(&self) -> &Grid {
         match self {

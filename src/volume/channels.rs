@@ -42,6 +42,11 @@ impl Volume {
         std::iter::once(self).chain(self.further.iter().map(Arc::as_ref))
     }
 
+    /// This channel without further ones.
+    pub(crate) fn alone(&self) -> Self {
+        Self { further: Vec::new(), ..self.clone() }
+    }
+
     /// A channel by its number, from 0; `None` if there are fewer channels.
     pub fn channel(&self, number: usize) -> Option<&Self> {
         self.channels().nth(number)

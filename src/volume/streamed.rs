@@ -174,7 +174,7 @@ impl StreamedVolume {
         let at = number.checked_sub(1);
         let first = at.map_or(&self.first, |at| &self.further[at]).clone();
         let sample = at.map_or(&self.sample, |at| &self.sample.further[at]);
-        let sample = Volume { further: Vec::new(), ..Volume::clone(sample) }.sampling(*self.grid());
+        let sample = sample.alone().sampling(*self.grid());
         Self { first, further: Vec::new(), sample: Arc::new(sample), memory: self.memory }
     }
 

@@ -306,9 +306,34 @@ fn channels_that_do_not_belong_together_are_refused() {
         let error = headless(backend).view(streamed.clone(), &scene(2, &[&splatting])).unwrap_err().to_string();
         assert!(error.starts_with(&format!("splatting.compositing: {expected}")), "{error}");
     }
-    let maximum = scene(2, &["splatting.compositing=maximum"]);
-    let mut view = headless(Backend::Cpu).view(streamed.clone(), &maximum).unwrap();
-    let window = Window { slabs: 0..1, region: Region::whole([61, 47]) };
-    let error = headless(Backend::Cpu).draw_part(&mut view, &window).unwrap_err().to_string();
-    assert!(error.starts_with("splatting.compositing: found \"maximum\" of several channels for a part"), "{error}");
+}
+
+/// Of channels whose images add up each is streamed by itself.
+#[test]
+fn parts_of_images_that_add_up_merge() {
+    for (labelled, compositing, classification, backends) in [
+        (true, "maximum", "before", &BACKENDS[..]),
+        (false, "average", "after", &BACKENDS[2..]),
+        (false, "minimum", "before", &BACKENDS[2..]),
+    ] {
+        let volume = volume(2, labelled);
+        let splatting = format!(
+            "splatting={{opacity_threshold=1,classification=\"{classification}\",compositing=\"{compositing}\"}}"
+        );
+        let scene = scene(2, &[&splatting]);
+        for &backend in backends {
+            let headless = headless(backend);
+            let mut view = headless.view(streamed(&volume).1, &scene).unwrap();
+            let whole = headless.draw(&mut view).unwrap().image;
+            let parts = in_four(&headless, &mut view);
+            assert_eq!(parts[0].further.len(), 1);
+            let merged = Image::merge(parts).unwrap();
+            assert_at_most(largest_difference(&merged, &whole), 1e-6, format!("{backend} {compositing}"));
+            let (_, stats) = headless.draw_part(&mut view, &Window::whole([61, 47])).unwrap();
+            assert_eq!(
+                stats.store.map(|store| store.chunks_total),
+                headless.draw(&mut view).unwrap().stats.store.map(|store| store.chunks_total)
+            );
+        }
+    }
 }

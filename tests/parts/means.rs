@@ -112,22 +112,25 @@ fn tables_belong_to_means() {
         Part::open(&path).map(|opened| opened.identity).map_err(|error| error.to_string())
     };
     assert_eq!(reopened(&|_| ()).unwrap(), part.identity);
-    let message = reopened(&|part| part.identity.mean = None).unwrap_err();
-    assert!(message.contains("part.mean: found none, allowed: tables where compositing is \"average\""), "{message}");
+    let message = reopened(&|part| part.identity.means.clear()).unwrap_err();
+    assert!(
+        message.contains("part.means: found 0 tables, allowed: 1: one for each image where compositing is \"average\""),
+        "{message}"
+    );
     let message = reopened(&|part| part.identity.compositing = Compositing::Maximum).unwrap_err();
-    assert!(message.contains("part.mean: found tables, allowed: tables where "), "{message}");
+    assert!(message.contains("part.means: found 1 tables, allowed: 0: "), "{message}");
     let message = reopened(&|part| {
-        let tables = part.identity.mean.as_mut().unwrap();
+        let tables = &mut part.identity.means[0];
         tables.opacity = Ramp::new(vec![(0.0, 0.5), (1.0, 1.5)]).unwrap();
     });
     let message = message.unwrap_err();
-    assert!(message.contains("part.mean: found mean.opacity[1][1]: found 1.5"), "{message}");
-    let message = reopened(&|part| part.identity.mean.as_mut().unwrap().iso_ranges = Some(vec![[2.0, 1.0]]));
+    assert!(message.contains("part.means: found mean.opacity[1][1]: found 1.5"), "{message}");
+    let message = reopened(&|part| part.identity.means[0].iso_ranges = Some(vec![[2.0, 1.0]]));
     assert!(message.unwrap_err().contains("mean.iso_ranges[0]"));
     // A file of another kind is not written.
     let long = (0..60_000).map(|at| (f64::from(at) / 7.0, 0.5)).collect();
     let mut part = part;
-    part.identity.mean.as_mut().unwrap().opacity = Ramp::new(long).unwrap();
+    part.identity.means[0].opacity = Ramp::new(long).unwrap();
     let message = part.save(&folder.path().join("long.npz")).unwrap_err().to_string();
     assert!(message.contains("part.json: found ") && message.contains("or a file .exr"), "{message}");
     assert!(!folder.path().join("long.npz").exists());

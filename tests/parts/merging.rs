@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use sheetsplat::cpu::CpuRenderer;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
+use sheetsplat::part::Content;
 use sheetsplat::scene::{Channel, Scene, VolumeSource};
 use sheetsplat::settings::{
     Classification, Compositing, Fit, Interpolation, Order, Projection, Ramp, Rasterizer, Region, Window,
@@ -141,21 +143,61 @@ fn parts_of_several_channels_merge() {
     use Compositing::{Average, Exponential, Linear, Maximum, Minimum, Surface, Xray};
     for classification in [Classification::Before, Classification::After] {
         for compositing in [Linear, Exponential, Xray, Surface, Maximum, Minimum, Average] {
-            let is_joined = matches!(compositing, Maximum | Minimum | Average)
-                || compositing == Surface && classification == Classification::After;
-            for (volume, scene) in scenes(compositing, classification, 24).map(with_channel) {
-                if !is_joined {
-                    compare(Backend::Cpu, &volume, &scene);
+            for (volume, mut scene) in scenes(compositing, classification, 24).map(with_channel) {
+                if (compositing, classification) == (Surface, Classification::After) {
+                    // First hits tell which channel is the nearest.
+                    let headless = headless(Backend::Cpu);
+                    let mut view = headless.view(volume, &scene).unwrap();
+                    let message = headless.draw_part(&mut view, &SOME).unwrap_err().to_string();
+                    assert!(message.contains("of several channels for a part of an image"), "{message}");
                     continue;
                 }
-                // What is added up after compositing has no parts.
-                let headless = headless(Backend::Cpu);
-                let mut view = headless.view(volume, &scene).unwrap();
-                let window = Window { slabs: 0..2, region: Region { x: 0, y: 0, width: 4, height: 4 } };
-                let message = headless.draw_part(&mut view, &window).unwrap_err().to_string();
-                assert!(message.contains("of several channels for a part of an image"), "{message}");
+                scene.shading.enabled = !matches!(compositing, Minimum | Maximum);
+                compare(Backend::Cpu, &volume, &scene);
             }
         }
+    }
+}
+
+const SOME: Window = Window { slabs: 0..2, region: Region { x: 0, y: 0, width: 4, height: 4 } };
+
+/// Where channels share no sheets, a part has pixels for each, and every backend draws them.
+#[test]
+fn parts_of_images_that_add_up_merge() {
+    let cases = [
+        (Compositing::Maximum, Classification::Before),
+        (Compositing::Minimum, Classification::After),
+        (Compositing::Average, Classification::Before),
+        (Compositing::Average, Classification::After),
+    ];
+    for (compositing, classification) in cases {
+        let [(volume, mut scene), _] = scenes(compositing, classification, 24).map(with_channel);
+        scene.shading.enabled = false;
+        for backend in [Backend::Gpu, Backend::Reference] {
+            compare(backend, &volume, &scene);
+        }
+        let drawn = parts(&headless(Backend::Cpu), &volume, &scene, 2);
+        assert!(drawn.iter().all(|part| (part.identity.images, part.further.len()) == (2, 1)));
+        let shows = |content: &Content| content.colors.iter().any(|color| color[3] > 0.0);
+        let both = drawn.iter().any(|part| shows(&part.content) && shows(&part.further[0]));
+        assert!(both || classification == Classification::After && compositing == Compositing::Average);
+        // In files, too.
+        let folder = tempfile::tempdir().unwrap();
+        let reopened = ["part.exr", "part.npz"].map(|name| {
+            drawn[0].save(&folder.path().join(name)).unwrap();
+            Part { name: drawn[0].name.clone(), ..Part::open(&folder.path().join(name)).unwrap() }
+        });
+        assert!(reopened.iter().all(|part| *part == drawn[0]));
+        // A channel without opacity changes nothing.
+        scene.further[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
+        compare(Backend::Cpu, &volume, &scene);
+        let mut short = parts(&headless(Backend::Cpu), &volume, &scene, 2);
+        short[1].further.clear();
+        let message = Image::merge(short).unwrap_err().to_string();
+        assert!(message.contains("images of channels: found 1, allowed: 2"), "{message}");
+        // What draws all channels at once refuses it.
+        let message = CpuRenderer::new(volume, &scene).unwrap().draw_part(&SOME).unwrap_err().to_string();
+        assert!(message.contains("of several channels for a part of an image"), "{message}");
     }
 }
 

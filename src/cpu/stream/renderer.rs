@@ -82,6 +82,11 @@ impl StreamRenderer {
         Ok(Self { volume, values, scene, transfer, sampled, simd, level })
     }
 
+    /// The volume that is drawn.
+    pub(crate) fn volume(&self) -> &StreamedVolume {
+        &self.volume
+    }
+
     /// The settings.
     pub fn scene(&self) -> &Scene {
         &self.scene

@@ -131,7 +131,7 @@ impl<'a> ChannelChunks<'a> {
 }
 
 /// The values that have an opacity under the tables of any label of a channel.
-pub(super) fn opaque_values(transfer: &TransferFunction) -> ValueSet {
+pub(in crate::headless) fn opaque_values(transfer: &TransferFunction) -> ValueSet {
     let tables = transfer.labels.keys().map(|&label| transfer.tables(Some(label)));
     tables.fold(ValueSet::of(transfer), |all, tables| all.union(&ValueSet::of_tables(&tables)))
 }

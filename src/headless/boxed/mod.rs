@@ -3,13 +3,12 @@
 
 mod channel;
 mod chunks;
-mod layers;
 
 use std::ops::Range;
 
 use web_time::Instant;
 
-use super::{Headless, milliseconds_since};
+use super::{Headless, joined, milliseconds_since};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
@@ -24,6 +23,7 @@ use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
 use crate::volume::{StreamedVolume, check_grids};
+pub(super) use channel::opaque_values;
 use chunks::{Chunks, Filled};
 
 /// The side in pixels of the regions that an image is divided into. A region whose voxels do not fit into memory is divided further.
@@ -53,6 +53,10 @@ impl BoxedView {
         self.backend
     }
 
+    pub(super) fn volume(&self) -> &StreamedVolume {
+        &self.volume
+    }
+
     pub(super) fn scene(&self) -> &Scene {
         &self.scene
     }
@@ -72,8 +76,8 @@ impl BoxedView {
     /// Draws a frame.
     pub(super) fn draw(&self, headless: &Headless) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        if joining(&self.volume, &self.scene).is_some() {
-            return layers::draw(&self.volume, &self.scene, headless);
+        if part::joining(&self.volume.sample, &self.scene).is_some() {
+            return joined::draw(&self.volume, &self.scene, headless);
         }
         let size = [self.scene.image.width, self.scene.image.height];
         let (parts, stats) = self.parts(&Window::whole(size), headless)?;
@@ -166,13 +170,13 @@ impl Walk<'_> {
         self.stats = Stats { prepare_ms: prepare_ms + stats.prepare_ms, ..stats };
         let own = std::mem::replace(&mut self.stats.counts, counts);
         self.stats.counts.add_channel(&own);
-        Ok(Part::named(self.identity.clone(), window.clone(), content))
+        Ok(Part::named(self.identity.clone(), window.clone(), vec![content]))
     }
 
     /// A window that shows nothing.
     fn empty(&self, window: &Window) -> Part {
-        let content = Content { colors: vec![[0.0; 4]; window.region.pixels()], extremes: Vec::new() };
-        Part::named(self.identity.clone(), window.clone(), content)
+        let content = Content::empty(window.region.pixels(), false);
+        Part::named(self.identity.clone(), window.clone(), vec![content])
     }
 
     /// Whether nothing behind what is drawn can be seen.
@@ -202,7 +206,7 @@ fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(),
     let Splatting { compositing, classification, .. } = scene.classified(&volume.sample).splatting;
     let by_length = matches!(compositing, Compositing::Minimum | Compositing::Average);
     let by_range = compositing == Compositing::Maximum && classification == Classification::After;
-    let joining = joining(volume, scene);
+    let joining = part::joining(&volume.sample, scene);
     let is_unlabelled = volume.channels().all(|channel| channel.labels.is_none());
     // Each channel by itself is then drawn chunk by chunk.
     let is_by_chunks = backend == Backend::Cpu && is_unlabelled && joining == Some(Joining::Sum);
@@ -219,12 +223,6 @@ fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(),
     let after = if by_length { "" } else { " with splatting.classification = \"after\"" };
     let found = format!("{:?}{after} for {of}", name_of(COMPOSITINGS, compositing));
     Err(SettingError::new("splatting.compositing", found, allowed).into())
-}
-
-/// How the images of channels become one; `None` if they share sheets, or there is only one.
-fn joining(volume: &StreamedVolume, scene: &Scene) -> Option<Joining> {
-    let are_several = !volume.further.is_empty();
-    Joining::of(scene.splatting.compositing, scene.classification(&volume.sample)).filter(|_| are_several)
 }
 
 /// The squares of some side, or what is left of them, that cover a region.
@@ -255,7 +253,7 @@ fn side_by_side(parts: Vec<Part>, window: &Window) -> Result<Part, RenderError> 
     }
     let identity = identity.ok_or_else(|| RenderError::Readback("a window has no region".to_owned()))?;
     let content = Content { colors, extremes: Vec::new() };
-    Ok(Part::named(identity, window.clone(), content))
+    Ok(Part::named(identity, window.clone(), vec![content]))
 }
 
 /// Parts of one walk merge.
