@@ -134,6 +134,10 @@ impl Headless {
         let reads = view.reads;
         let volume = view.volume();
         if part::joining(volume.sample(), view.scene()).is_some() {
+            let backend = view.backend_ref().backend();
+            if backend != self.backend() {
+                return Err(self.refuse(backend).into());
+            }
             return joined::draw_part((&volume, view.scene()), window, self);
         }
         let (part, stats) = match (&self.drawer, view.backend_mut()) {

@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::mean::{MeanTables, shows_means};
-use super::{Identity, Part};
+use super::{Identity, MAX_IMAGES, Part};
 use crate::image::ImageError;
 use crate::image::channels::Joining;
 use crate::image::open::content;
@@ -16,9 +16,6 @@ use crate::settings::window::{Region, Window};
 
 /// The version of the description.
 const VERSION: u32 = 1;
-
-/// The most images of channels.
-const MAX_IMAGES: usize = 256;
 
 /// The largest image, pixels along a side, as on the native backend.
 const MAX_SIZE: u32 = 32_768;

@@ -148,6 +148,9 @@ impl Identity {
     }
 }
 
+/// The most images that are added up.
+const MAX_IMAGES: usize = 256;
+
 /// How the images of a volume's channels become one; `None` if they share sheets, or there is only one.
 pub(crate) fn joining(volume: &Volume, scene: &Scene) -> Option<Joining> {
     let joining = Joining::of(scene.splatting.compositing, scene.classification(volume));
@@ -182,6 +185,11 @@ pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(
         // First hits tell which channel is the nearest, and parts do not carry them.
         let found = "\"surface\" with splatting.classification = \"after\" of several channels for a part of an image";
         return Err(SettingError::new("splatting.compositing", found, "another compositing, or \"before\" with it"));
+    }
+    let channels = volume.channels().count();
+    if joining(volume, scene).is_some() && channels > MAX_IMAGES {
+        let found = format!("{channels} channels whose images are added up for a part of an image");
+        return Err(SettingError::new("volume", found, format!("at most {MAX_IMAGES}")));
     }
     if splatting.method != Method::ImageAligned {
         let method = crate::scene::names::name_of(crate::scene::names::METHODS, splatting.method);

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 use sheetsplat::cpu::CpuRenderer;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
 use sheetsplat::part::Content;
@@ -195,10 +195,31 @@ fn parts_of_images_that_add_up_merge() {
         short[1].further.clear();
         let message = Image::merge(short).unwrap_err().to_string();
         assert!(message.contains("images of channels: found 1, allowed: 2"), "{message}");
+        // A view of another backend is refused, as it is elsewhere.
+        let mut view = headless(Backend::Reference).view(Arc::clone(&volume), &scene).unwrap();
+        let message = headless(Backend::Cpu).draw_part(&mut view, &SOME).unwrap_err().to_string();
+        assert!(message.starts_with("view: found one of the reference backend"), "{message}");
         // What draws all channels at once refuses it.
         let message = CpuRenderer::new(volume, &scene).unwrap().draw_part(&SOME).unwrap_err().to_string();
         assert!(message.contains("of several channels for a part of an image"), "{message}");
     }
+}
+
+/// A file that could not be opened again is not begun.
+#[test]
+fn parts_of_too_many_images_are_refused() {
+    let channel =
+        || Volume::new("test", UVec3::splat(2), DVec3::ONE, vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]).unwrap();
+    let volume = channel().with_channels("test", (0..256).map(|_| channel()).collect()).unwrap();
+    let (_, mut scene) = head(8, [16, 16]);
+    scene.splatting.compositing = Compositing::Maximum;
+    let headless = headless(Backend::Reference);
+    let mut view = headless.view(volume, &scene).unwrap();
+    let message = headless.draw_part(&mut view, &SOME).unwrap_err().to_string();
+    assert_eq!(
+        message,
+        "volume: found 257 channels whose images are added up for a part of an image, allowed: at most 256"
+    );
 }
 
 /// In homogeneous matter sheets are equal but for the order in which they are added up, which parts do not change.
