@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::content::Extreme;
 use crate::scene::Scene;
 use crate::settings::splatting::{Classification, Compositing};
-use crate::settings::transfer_function::{Ramp, TransferFunction};
+use crate::settings::transfer_function::{Ramp, Tables, TransferFunction};
 use crate::volume::Volume;
 
 /// The tables that classify the means.
@@ -45,17 +45,14 @@ impl MeanTables {
             return carried;
         }
         let value = f64::from(mean.value);
-        let is_in =
-            self.iso_ranges.as_ref().is_none_or(|ranges| ranges.iter().any(|&[lo, hi]| lo <= value && value <= hi));
-        if !is_in {
-            return [0.0; 4];
-        }
-        let opacity = self.opacity.at(value);
+        let (color, opacity, iso_ranges) = (&self.color, &self.opacity, self.iso_ranges.as_deref());
+        let tables = Tables { visible: true, color, opacity, gradient_opacity: None, iso_ranges };
+        let alpha = tables.alpha(value, 0.0);
         if self.has_colors {
-            let [red, green, blue, alpha] = carried.map(f64::from);
-            return [red, green, blue, 1.0].map(|channel| (channel * alpha * opacity) as f32);
+            let [red, green, blue, own] = carried.map(f64::from);
+            return [red, green, blue, 1.0].map(|channel| (channel * own * alpha) as f32);
         }
-        self.color.at(value).extend(1.0).to_array().map(|channel| (channel * opacity) as f32)
+        tables.color.at(value).extend(1.0).to_array().map(|channel| (channel * alpha) as f32)
     }
 }
 

@@ -127,7 +127,7 @@ fn tables_belong_to_means() {
     assert!(message.contains("part.means: found mean.opacity[1][1]: found 1.5"), "{message}");
     let message = reopened(&|part| part.identity.means[0].iso_ranges = Some(vec![[2.0, 1.0]]));
     assert!(message.unwrap_err().contains("mean.iso_ranges[0]"));
-    // A file of another kind is not written.
+    // Tables that are too long for the description in an NPZ file are refused before anything is written; EXR holds them.
     let long = (0..60_000).map(|at| (f64::from(at) / 7.0, 0.5)).collect();
     let mut part = part;
     part.identity.means[0].opacity = Ramp::new(long).unwrap();
