@@ -21,7 +21,7 @@ fn is_by_means() -> bool {
 fn in_box(at: vec3f, half: vec3f) -> vec2f {
     var depths = vec2f(cut.box_half.w, FAR);
     for (var axis = 0u; axis < 3u; axis += 1u) {
-        let place = dot(cut.box_at[axis].xyz, at);
+        let place = dot(cut.box_at[axis].xyz, at) - cut.box_at[axis].w;
         let slope = dot(cut.box_along[axis].xyz, at);
         let crossings = (vec2f(-half[axis], half[axis]) - place) / slope;
         let inside = vec2f(min(crossings.x, crossings.y), max(crossings.x, crossings.y));

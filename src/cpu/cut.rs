@@ -133,12 +133,7 @@ impl RayMode {
 
 /// The half spaces of a box around a grid's voxels.
 fn around(grid: &Grid) -> [HalfSpace; 6] {
-    let half = (grid.center() + 1.0) * grid.aspect();
-    let of = |at: usize| {
-        let axis = DVec3::AXES[at / 2];
-        HalfSpace { normal: if at.is_multiple_of(2) { axis } else { -axis }, offset: axis.dot(half) }
-    };
-    std::array::from_fn(of)
+    HalfSpace::around(DVec3::ZERO, grid.center() + 1.0, grid)
 }
 
 impl TileRays {

@@ -30,7 +30,7 @@ pub(super) struct Layer {
 #[derive(Clone, Debug)]
 enum List {
     /// Those that take part in any channel, and their materials.
-    Before(BrickList, Materials),
+    Before(Box<BrickList>, Materials),
     /// Those of each channel.
     After(Vec<Coefficients>),
 }
@@ -99,7 +99,7 @@ impl List {
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
         let bricks = BrickList::new(volume.grid(), &classify(volume, transfer, &clipped));
         let materials = Materials::new(bricks.bricks().len(), channels(volume, transfer).count());
-        Ok(Self::Before(bricks, materials))
+        Ok(Self::Before(Box::new(bricks), materials))
     }
 }
 

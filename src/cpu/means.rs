@@ -28,14 +28,12 @@ pub(super) struct Means {
 
 impl Means {
     pub(super) fn new(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Self {
-        let RayBox { half, nearest } = RayBox::new(view, grid, splatting);
+        let RayBox { center, half, nearest } = RayBox::new(view, grid, splatting);
         let compositing = splatting.compositing;
         let spare = if compositing == Compositing::Minimum { HAIR } else { 0.0 };
-        let around = |half: DVec3| {
-            let [x, y, z] = DVec3::AXES;
-            [x, y, z, -x, -y, -z].map(|normal| HalfSpace { normal, offset: normal.abs().dot(half * grid.aspect()) })
-        };
-        Self { compositing, counted: around(half + spare), centers: around(grid.center() + HAIR), nearest }
+        let around = |half: DVec3| HalfSpace::around(center, half, grid);
+        let (_, centers) = grid.whole();
+        Self { compositing, counted: around(half + spare), centers: around(centers + HAIR), nearest }
     }
 
     /// True if some slabs do not count.

@@ -8,9 +8,11 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::settings::splatting::{Classification, Compositing, Splatting};
 use crate::volume::Grid;
 
-/// A box around the volume's centre.
+/// A box around the centre of the volume, of which a grid may be a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayBox {
+    /// Its centre in grid steps from the grid's.
+    pub center: DVec3,
     /// Half its size in grid steps.
     pub half: DVec3,
     /// The minimum depth along w that counts, in `unit`s from the eye; minus infinity without an eye.
@@ -21,13 +23,13 @@ impl RayBox {
     /// The box for [`Compositing::Minimum`], in which kernels are complete, or for [`Compositing::Average`] and
     /// [`Classification::After`], with all voxels; the other modes do not use it.
     pub fn new(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Self {
-        let (centers, near) = (grid.center(), view.perspective.map_or(f64::NEG_INFINITY, |it| it.eye.near));
+        let ((center, centers), near) = (grid.whole(), view.perspective.map_or(f64::NEG_INFINITY, |it| it.eye.near));
         if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
-            return Self { half: centers + 0.5, nearest: near };
+            return Self { center, half: centers + 0.5, nearest: near };
         }
         // The maximum depth by which a kernel reaches beyond a voxel at the near plane.
         let reach = splatting.radius * (view.basis.w * grid.aspect()).length();
-        Self { half: (centers - splatting.radius).max(centers / 2.0), nearest: near + reach }
+        Self { center, half: (centers - splatting.radius).max(centers / 2.0), nearest: near + reach }
     }
 }
 
@@ -37,9 +39,9 @@ pub fn covered(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Range
     if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
         return 0.0..0.0;
     }
-    let RayBox { half, nearest } = RayBox::new(view, grid, splatting);
+    let RayBox { center, half, nearest } = RayBox::new(view, grid, splatting);
     let row = view.screen_from_voxel[2];
-    let (middle, spread) = (row.dot(grid.center().extend(1.0)), row.truncate().abs().dot(half));
+    let (middle, spread) = (row.dot((grid.center() + center).extend(1.0)), row.truncate().abs().dot(half));
     let start = match &view.perspective {
         Some(perspective) if perspective.is_image_aligned => (middle - spread).max(view.slabs.origin + nearest),
         _ => middle - spread,

@@ -143,8 +143,8 @@ pub struct Cut {
     pub surface_w: [f32; 4],
     /// Two rows for each plane, whose products with the position are the distance from the plane at depth 0 and its change per unit of depth.
     pub planes: [[f32; 4]; 24],
-    /// For each axis of the grid the row whose product with the position is the ray's coordinate at depth 0, in grid steps from the volume's
-    /// centre.
+    /// For each axis of the grid the row whose product with the position is the ray's coordinate at depth 0, in grid steps from the grid's centre, and then the
+    /// coordinate there of the centre of the [`RayBox`](crate::geometry::means::RayBox).
     pub box_at: [[f32; 4]; 3],
     /// The same for its change per unit of depth.
     pub box_along: [[f32; 4]; 3],

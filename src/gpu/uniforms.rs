@@ -153,7 +153,7 @@ pub fn cut(
     for (rows, &HalfSpace { normal, offset }) in planes.chunks_exact_mut(2).zip(&half_spaces) {
         rows.copy_from_slice(&[row(normal, origin, offset), row(normal, along, 0.0)]);
     }
-    let RayBox { half, nearest } = RayBox::new(view, grid, splatting);
+    let RayBox { center, half, nearest } = RayBox::new(view, grid, splatting);
     let axes = DVec3::AXES.map(|axis| axis / grid.aspect());
     let sheet_depth = view.sheet_depth_row(grid.aspect(), grid.center());
     let (normal, offset) = (sheet_depth.truncate(), sheet_depth.w);
@@ -164,7 +164,10 @@ pub fn cut(
         surface_depth: surfaces.map_or([0.0; 4], |(depths, _)| in_f32(depths.depth)),
         surface_w: surfaces.map_or([0.0; 4], |(depths, _)| in_f32(depths.w)),
         planes,
-        box_at: axes.map(|axis| row(axis, origin, 0.0)),
+        box_at: [0, 1, 2].map(|at| {
+            let [right, down, middle, _] = row(axes[at], origin, 0.0);
+            [right, down, middle, center[at] as f32]
+        }),
         box_along: axes.map(|axis| row(axis, along, 0.0)),
         box_half: in_f32(half.extend(nearest.max(f64::from(f32::MIN)))),
         surface_origin: surfaces.map_or([0; 2], |(_, origin)| origin),

@@ -175,12 +175,20 @@ pub(crate) fn check_sheets(volume: &Volume, scene: &Scene) -> Result<(), Setting
     ))
 }
 
+/// Whether the means of rays are classified by tables of labels. Which label's table it is, the whole ray decides.
+pub(crate) fn has_labelled_means(volume: &Volume, scene: &Scene) -> bool {
+    let transfer = scene.resolve(volume);
+    let mut channels = volume.channels().zip(transfer.channels());
+    let has_tables = channels.any(|(channel, of)| channel.labels().is_some() && !of.labels.is_empty());
+    has_tables && mean::shows_means(scene.splatting.compositing, scene.classification(volume))
+}
+
 /// Checks, before anything is drawn, that a scene has parts, and that a window is one.
 ///
 /// # Errors
 /// If the scene's method is not image-aligned, an economy is in use, its compositing has no parts, or the window does not lie in the image.
 pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(), SettingError> {
-    let (splatting, classification) = (&scene.splatting, scene.classification(volume));
+    let splatting = &scene.splatting;
     if joining(volume, scene) == Some(Joining::Nearest) {
         // First hits tell which channel is the nearest, and parts do not carry them.
         let found = "\"surface\" with splatting.classification = \"after\" of several channels for a part of an image";
@@ -200,11 +208,7 @@ pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(
         let found = format!("{} for a part of an image", economy.value);
         return Err(SettingError::new(economy.key, found, economy.off.to_string()));
     }
-    // Which label's table classifies a mean, the whole ray decides.
-    let transfer = scene.resolve(volume);
-    let mut channels = volume.channels().zip(transfer.channels());
-    let has_tables = channels.any(|(channel, of)| channel.labels().is_some() && !of.labels.is_empty());
-    if mean::shows_means(splatting.compositing, classification) && has_tables {
+    if has_labelled_means(volume, scene) {
         let found = "\"average\" with splatting.classification = \"after\" and tables of labels for a part of an image";
         return Err(SettingError::new("splatting.compositing", found, "another compositing, or \"before\" with it"));
     }

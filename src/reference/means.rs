@@ -30,14 +30,14 @@ impl Means {
         let ray = |at: u32| PixelRay::new(geometry, UVec2::new(at % width, at / width));
         let near = geometry.eye.map_or(f64::NEG_INFINITY, |eye| eye.near);
         let in_box = |at: u32, half_steps: DVec3, nearest: f64| {
-            let inside = ray(at).inside(&centered_box(geometry, half_steps));
+            let inside = ray(at).inside(&volume_box(geometry, half_steps));
             inside.start.max(nearest)..inside.end
         };
         let shown = |at: u32, inside: Range<f64>| {
             let shown = cut::shown(geometry, surfaces, at);
             inside.start.max(shown.start)..inside.end.min(shown.end)
         };
-        let centers = geometry.grid.center();
+        let (_, centers) = geometry.grid.whole();
         let weight = |at: u32| {
             let ray = ray(at);
             if compositing != Compositing::Average {
@@ -86,9 +86,8 @@ impl Means {
     }
 }
 
-/// A box around the volume's centre, given half its size.
-pub(super) fn centered_box(geometry: &Geometry, half_steps: DVec3) -> [HalfSpace; 6] {
-    let half = half_steps * geometry.grid.aspect();
-    let [x, y, z] = DVec3::AXES;
-    [x, y, z, -x, -y, -z].map(|normal| HalfSpace { normal, offset: normal.abs().dot(half) })
+/// A box around the centre of the volume, of which the grid may be a part, given half its size.
+pub(super) fn volume_box(geometry: &Geometry, half_steps: DVec3) -> [HalfSpace; 6] {
+    let (center, _) = geometry.grid.whole();
+    HalfSpace::around(center, half_steps, &geometry.grid)
 }

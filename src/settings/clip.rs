@@ -35,6 +35,15 @@ pub struct HalfSpace {
     pub offset: f64,
 }
 
+impl HalfSpace {
+    /// Those whose intersection is a box, given its centre from a grid's, and half its size, both in grid steps.
+    pub(crate) fn around(center: DVec3, half: DVec3, grid: &Grid) -> [Self; 6] {
+        let [x, y, z] = DVec3::AXES;
+        let (center, half) = (center * grid.aspect(), half * grid.aspect());
+        [x, y, z, -x, -y, -z].map(|normal| Self { normal, offset: normal.abs().dot(half) - normal.dot(center) })
+    }
+}
+
 impl Clip {
     /// Whether nothing is cut away.
     pub fn is_empty(&self) -> bool {

@@ -36,12 +36,14 @@ pub struct Grid {
     pub(crate) finest: Option<DVec3>,
     /// The place of the grid's centre in the world.
     pub(crate) place: DVec3,
+    /// Of a box of a volume its first voxel there, and the volume's voxels along each axis; `None` if it is all of it.
+    pub(crate) whole: Option<(UVec3, UVec3)>,
 }
 
 impl Grid {
     /// A grid whose centre is the world's origin.
     pub const fn new(dims: UVec3, spacing: DVec3) -> Self {
-        Self { dims, spacing, finest: None, place: DVec3::ZERO }
+        Self { dims, spacing, finest: None, place: DVec3::ZERO, whole: None }
     }
 
     /// The grid of a coarser level of a volume (SPEC §13), whose centre lies at `place` from the centre of the finest level. Its unit of length is that of
@@ -59,7 +61,8 @@ impl Grid {
 
     /// The grid of a box of its voxels, where they lie.
     pub(crate) fn part(&self, from: UVec3, dims: UVec3) -> Self {
-        let own = Self { dims, ..*self };
+        let (first, all) = self.whole.unwrap_or((UVec3::ZERO, self.dims));
+        let own = Self { dims, whole: Some((first + from, all)), ..*self };
         Self { place: self.place + (from.as_dvec3() + own.center() - self.center()) * self.spacing, ..own }
     }
 
@@ -118,6 +121,13 @@ impl Grid {
     /// The grid's centre in voxel coordinates.
     pub fn center(&self) -> DVec3 {
         (self.dims.as_dvec3() - 1.0) / 2.0
+    }
+
+    /// The box around the voxels' centres of the volume, of which the grid may be a part: its centre in grid steps from the grid's own, and half its size.
+    pub(crate) fn whole(&self) -> (DVec3, DVec3) {
+        let Some((first, dims)) = self.whole else { return (DVec3::ZERO, self.center()) };
+        let centers = Self { dims, ..*self }.center();
+        (centers - first.as_dvec3() - self.center(), centers)
     }
 
     /// A voxel's position from the grid's centre, in world units.

@@ -55,6 +55,11 @@ impl StreamedLevel {
         &self.store.levels()[self.level].grid
     }
 
+    /// The minimum and maximum of the values, if the store knows them.
+    pub(crate) fn range(&self) -> Option<[f32; 2]> {
+        self.store.range(self.level)
+    }
+
     /// Checks that the store has the level.
     fn check(&self) -> Result<(), VolumeError> {
         let levels = self.store.levels().len();

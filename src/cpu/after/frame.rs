@@ -284,13 +284,9 @@ impl<'a> Frame<'a> {
 
 /// The half spaces within which pixels' rays count: the box of voxel cells, beyond the near plane, within the cuts.
 fn kept(view: &ViewGeometry, scene: &Scene, grid: &Grid) -> Vec<HalfSpace> {
-    let half = (grid.center() + 0.5) * grid.aspect();
+    let (center, centers) = grid.whole();
     let mut kept = if scene.clip.is_empty() { Vec::new() } else { scene.clip.half_spaces(grid) };
-    kept.extend(
-        DVec3::AXES
-            .into_iter()
-            .flat_map(|axis| [axis, -axis].map(|normal| HalfSpace { normal, offset: axis.dot(half) })),
-    );
+    kept.extend(HalfSpace::around(center, centers + 0.5, grid));
     kept.extend(view.perspective.map(|perspective| {
         let (eye, w) = (perspective.eye, view.basis.w);
         HalfSpace { normal: w, offset: -eye.position.dot(w) - eye.near }

@@ -202,7 +202,7 @@ impl StreamRenderer {
 
     /// The map from values to the numbers that are interpolated, and whether its range is that of all values.
     fn numbers(&self) -> (Normalization, bool) {
-        let known = self.values.store.range(self.values.level);
+        let known = self.values.range();
         let range = known.or(self.sampled).unwrap_or([0.0; 2]);
         (Normalization::new(range.map(f64::from)), known.is_some())
     }

@@ -8,6 +8,7 @@ use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::lists::iso_range::ValueSet;
 use crate::parallel::prelude::*;
+use crate::settings::splatting::{Classification, Compositing, Splatting};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::range::{EMPTY, union};
 use crate::volume::{Grid, Labels, StoreLevel, StreamedChannel, StreamedLevel, Volume, VolumeError, labels_of};
@@ -39,6 +40,8 @@ pub(super) struct ChannelChunks<'a> {
     opaque: ValueSet,
     /// Whether points between voxels have values between theirs.
     is_between: bool,
+    /// Whether values count that have no opacity ([`counts_all`]).
+    counts_all: bool,
     /// Whether chunks are no smaller than the distance at which values bear on what is seen, so that chunks tell what can be seen by their neighbours' values.
     is_told_by_chunks: bool,
 }
@@ -51,14 +54,15 @@ impl<'a> ChannelChunks<'a> {
     pub(super) fn new(
         (number, channel): (usize, &'a StreamedChannel),
         transfer: &TransferFunction,
-        is_after: bool,
+        splatting: &Splatting,
         reach: UVec3,
     ) -> Result<Self, SettingError> {
         let values = LevelChunks::new(&channel.values)?;
         let labels = channel.labels.as_ref().map(LevelChunks::new).transpose()?;
         let opaque = opaque_values(transfer);
         let is_told_by_chunks = reach.cmple(values.level.chunk).all();
-        Ok(Self { number, values, labels, opaque, is_between: is_after, is_told_by_chunks })
+        let is_between = splatting.classification == Classification::After;
+        Ok(Self { number, values, labels, opaque, is_between, counts_all: counts_all(splatting), is_told_by_chunks })
     }
 
     /// Whether any value has an opacity.
@@ -87,7 +91,7 @@ impl<'a> ChannelChunks<'a> {
         }
         let mut values = self.values.read(within)?;
         values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f32::NAN);
-        if values.iter().all(|value| value.is_nan()) {
+        if !self.counts_all && values.iter().all(|value| value.is_nan()) {
             return Ok(None);
         }
         let volume = Volume::piece(*grid, values);
@@ -100,7 +104,7 @@ impl<'a> ChannelChunks<'a> {
 
     /// Whether anything of the chunks in a box can be seen.
     fn is_visible(&self, within: VoxelBox) -> Result<bool, VolumeError> {
-        if !self.is_told_by_chunks {
+        if self.counts_all || !self.is_told_by_chunks {
             return Ok(true);
         }
         for chunk in self.values.chunks(within) {
@@ -127,6 +131,15 @@ impl<'a> ChannelChunks<'a> {
         }
         let [min, max] = range;
         Ok(min <= max && self.opaque.meets(min, max))
+    }
+}
+
+/// Whether values without an opacity change pixels, because one value is chosen of all along a ray, or the least sheet, which may show nothing.
+fn counts_all(Splatting { compositing, classification, .. }: &Splatting) -> bool {
+    match compositing {
+        Compositing::Minimum => true,
+        Compositing::Maximum | Compositing::Average => *classification == Classification::After,
+        _ => false,
     }
 }
 

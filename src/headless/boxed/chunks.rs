@@ -55,8 +55,9 @@ impl<'a> Chunks<'a> {
         let reach = if is_after { geometry.reach(view) } else { UVec3::ZERO };
         let transfer = scene.resolve(&volume.sample);
         let channels = volume.channels().zip(transfer.channels()).enumerate();
-        let channels = channels
-            .map(|(number, (channel, transfer))| ChannelChunks::new((number, channel), transfer, is_after, reach));
+        let channels = channels.map(|(number, (channel, transfer))| {
+            ChannelChunks::new((number, channel), transfer, &scene.splatting, reach)
+        });
         let channels = channels.collect::<Result<Vec<_>, _>>()?;
         let channels = channels.into_iter().filter(ChannelChunks::has_opacity).collect();
         Ok(Self { volume, view: *view, half_box: geometry.widest_half_box(view), channels, most_held: 0 })

@@ -14,14 +14,15 @@ use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::image::channels::Joining;
-use crate::part::{self, Content, Identity, MergeError, Part};
+use crate::part::{self, Content, Extreme, Identity, MergeError, Part};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
 use crate::scene::names::{COMPOSITINGS, name_of};
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
+use crate::settings::splatting::{Compositing, Order};
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
+use crate::volume::range::range_of;
 use crate::volume::{StreamedVolume, check_grids};
 pub(super) use channel::opaque_values;
 use chunks::{Chunks, Filled};
@@ -106,6 +107,7 @@ impl BoxedView {
             chunks: Chunks::new(volume, &scene, &view)?,
             scene,
             headless,
+            range: volume.first.values.range().or_else(|| range_of(volume.sample.values().iter())).unwrap_or([0.0; 2]),
             parts: Vec::new(),
             stats: Stats::default(),
         };
@@ -131,6 +133,8 @@ struct Walk<'a> {
     chunks: Chunks<'a>,
     /// What draws the boxes.
     headless: &'a Headless,
+    /// The minimum and maximum of the values, or of the sample's.
+    range: [f32; 2],
     parts: Vec<Part>,
     stats: Stats,
 }
@@ -165,7 +169,11 @@ impl Walk<'_> {
 
     /// Draws a window from the voxels that it needs. A channel of which nothing is seen changes nothing, so that its table is left out.
     fn part(&mut self, (volume, channels): Filled, window: &Window) -> Result<Part, RenderError> {
-        let (content, stats) = self.headless.draw_box(volume, &self.scene.of_channels(&channels), window)?;
+        let range = range_of(volume.values().iter());
+        let (mut content, stats) = self.headless.draw_box(volume, &self.scene.of_channels(&channels), window)?;
+        if let Some(range) = range.filter(|_| self.scene.splatting.compositing != Compositing::Average) {
+            in_range(&mut content.extremes, range, self.range);
+        }
         let (counts, prepare_ms) = (self.stats.counts, self.stats.prepare_ms);
         self.stats = Stats { prepare_ms: prepare_ms + stats.prepare_ms, ..stats };
         let own = std::mem::replace(&mut self.stats.counts, counts);
@@ -175,7 +183,7 @@ impl Walk<'_> {
 
     /// A window that shows nothing.
     fn empty(&self, window: &Window) -> Part {
-        let content = Content::empty(window.region.pixels(), false);
+        let content = Content::empty(window.region.pixels(), self.identity.has_extremes());
         Part::named(self.identity.clone(), window.clone(), vec![content])
     }
 
@@ -193,6 +201,15 @@ impl Walk<'_> {
     }
 }
 
+/// Converts values that pixels chose, places in the range of a box's values, into places in the range of all.
+fn in_range(extremes: &mut [Extreme], own: [f32; 2], all: [f32; 2]) {
+    let span = |[low, high]: [f32; 2]| if high > low { f64::from(high) - f64::from(low) } else { 1.0 };
+    for extreme in extremes.iter_mut().filter(|extreme| extreme.counted >= Extreme::POINT) {
+        let value = f64::from(own[0]) + f64::from(extreme.value) * span(own);
+        extreme.value = ((value - f64::from(all[0])) / span(all)) as f32;
+    }
+}
+
 /// Checks that a scene can be drawn box by box by a backend.
 fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(), RenderError> {
     scene.check()?;
@@ -203,26 +220,17 @@ fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(),
     if backend == Backend::Cpu {
         crate::cpu::check(scene)?;
     }
-    let Splatting { compositing, classification, .. } = scene.classified(&volume.sample).splatting;
-    let by_length = matches!(compositing, Compositing::Minimum | Compositing::Average);
-    let by_range = compositing == Compositing::Maximum && classification == Classification::After;
-    let joining = part::joining(&volume.sample, scene);
-    let is_unlabelled = volume.channels().all(|channel| channel.labels.is_none());
-    // Each channel by itself is then drawn chunk by chunk.
-    let is_by_chunks = backend == Backend::Cpu && is_unlabelled && joining == Some(Joining::Sum);
-    let (of, allowed) = match joining {
+    let of = if part::joining(&volume.sample, scene) == Some(Joining::Nearest) {
         // First hits tell which channel is the nearest, and parts do not carry them.
-        Some(Joining::Nearest) => ("several channels of a volume that is streamed", "another one, or more memory"),
-        // Along rays, all slabs of the whole volume count; and values of boxes are scaled by their own ranges.
-        _ if (by_length || by_range) && !is_by_chunks => {
-            let other = if is_unlabelled { "another one, or the cpu backend" } else { "another one, or more memory" };
-            ("a volume that is streamed by this backend", other)
-        }
-        _ => return Ok(()),
+        "several channels of a volume"
+    } else if part::has_labelled_means(&volume.sample, scene) {
+        "tables of labels of a volume"
+    } else {
+        return Ok(());
     };
-    let after = if by_length { "" } else { " with splatting.classification = \"after\"" };
-    let found = format!("{:?}{after} for {of}", name_of(COMPOSITINGS, compositing));
-    Err(SettingError::new("splatting.compositing", found, allowed).into())
+    let compositing = name_of(COMPOSITINGS, scene.splatting.compositing);
+    let found = format!("{compositing:?} with splatting.classification = \"after\" for {of} that is streamed");
+    Err(SettingError::new("splatting.compositing", found, "another one, or more memory").into())
 }
 
 /// The squares of some side, or what is left of them, that cover a region.
@@ -241,19 +249,27 @@ fn tiles(region: &Region, side: u32) -> Vec<Region> {
 /// One part of the regions of a window.
 fn side_by_side(parts: Vec<Part>, window: &Window) -> Result<Part, RenderError> {
     let Window { region, .. } = window;
-    let mut colors = vec![[0.0; 4]; region.pixels()];
+    let mut content = Content::default();
     let mut identity = None;
     for part in parts {
         let own = part.window.region;
-        for (row, y) in part.content.colors.chunks_exact(own.width as usize).zip(own.y - region.y..) {
-            let first = (own.x - region.x + y * region.width) as usize;
-            colors[first..first + row.len()].copy_from_slice(row);
+        if identity.is_none() {
+            content = Content::empty(region.pixels(), part.identity.has_extremes());
         }
+        copy((&part.content.colors, &own), (&mut content.colors, region));
+        copy((&part.content.extremes, &own), (&mut content.extremes, region));
         identity = Some(part.identity);
     }
     let identity = identity.ok_or_else(|| RenderError::Readback("a window has no region".to_owned()))?;
-    let content = Content { colors, extremes: Vec::new() };
     Ok(Part::named(identity, window.clone(), vec![content]))
+}
+
+/// Copies the pixels of a region, row by row, to where they are in one around it; pixels may carry nothing.
+fn copy<T: Copy>((from, own): (&[T], &Region), (to, region): (&mut [T], &Region)) {
+    for (row, y) in from.chunks_exact(own.width as usize).zip(own.y - region.y..) {
+        let first = (own.x - region.x + y * region.width) as usize;
+        to[first..first + row.len()].copy_from_slice(row);
+    }
 }
 
 /// Parts of one walk merge.

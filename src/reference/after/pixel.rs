@@ -10,7 +10,7 @@ use super::{Frame, extreme, surface};
 use crate::part::Extreme;
 use crate::reference::composite::composite_pixel;
 use crate::reference::cut::{self, PixelRay};
-use crate::reference::means::centered_box;
+use crate::reference::means::volume_box;
 use crate::reference::shading;
 use crate::settings::splatting::{Compositing, Order};
 use crate::settings::transfer_function::Tables;
@@ -88,7 +88,7 @@ impl<'a> Pixel<'a> {
         let geometry = &frame.geometry;
         let ray = PixelRay::new(geometry, pixel);
         let index = pixel.x + pixel.y * geometry.size.x as u32;
-        let cells = ray.inside(&centered_box(geometry, geometry.grid.center() + 0.5));
+        let cells = ray.inside(&volume_box(geometry, geometry.grid.whole().1 + 0.5));
         let shown = cut::shown(geometry, frame.host.surfaces, index);
         let near = geometry.eye.map_or(f64::NEG_INFINITY, |eye| eye.near);
         let (start, end) = (cells.start.max(shown.start).max(near), cells.end.min(shown.end));
