@@ -75,7 +75,8 @@ fn is_visited(at: u32) -> bool {
     if any(high + sheet_group.half_box < vec2f(0.5)) || any(low - sheet_group.half_box > vec2f(frame.size) - 0.5) {
         return false;
     }
-    return sheet_group.culling == 0u || !is_behind(low, high);
+    // Not the uniform alone, for the reason that `start` gives.
+    return (sheet_group.culling | zero) == 0u || !is_behind(low, high);
 }
 
 @compute @workgroup_size(256)
@@ -83,8 +84,9 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     start(workgroup.z);
     // Every thread tests a run of bricks, at most 32 at a time, so that the results fit a word.
     var total = 0u;
-    for (var base = 0u; base < sheet_group.brick_count; base += WORKGROUP_SIZE * 32u) {
-        let rest = min(sheet_group.brick_count - base, WORKGROUP_SIZE * 32u);
+    let count = sheet_group.brick_count + zero;
+    for (var base = 0u; base < count; base += WORKGROUP_SIZE * 32u) {
+        let rest = min(count - base, WORKGROUP_SIZE * 32u);
         let run = (rest + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;
         let first = min(thread * run, rest);
         let end = min(first + run, rest);

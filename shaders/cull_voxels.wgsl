@@ -86,7 +86,7 @@ fn main(@builtin(local_invocation_index) slot: u32, @builtin(workgroup_id) workg
             first_sheet = 0.0;
             end_sheet = select(0.0, 1.0, depths.x < 0.0 && depths.y > 0.0);
         }
-        let is_drawn = on_screen && (is_close || !(sheet_group.culling != 0u && is_hidden(center_px)));
+        let is_drawn = on_screen && (is_close || !((sheet_group.culling | zero) != 0u && is_hidden(center_px)));
         // Front to back, boxes only shrink: what is off the screen or hidden stays so. Back to front, where nothing is hidden, they grow.
         if !is_drawn && frame.order == FRONT_TO_BACK {
             atomicOr(&hidden_now[word], bit);

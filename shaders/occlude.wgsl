@@ -60,7 +60,9 @@ fn rows(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
         return;
     }
     var all = row_word(word.y, word.x);
-    for (var step = 1u; step <= sheet_group.box_filter.x; step += 1u) {
+    // Not the uniform alone, for the reason that `start` gives.
+    let steps = sheet_group.box_filter.x + zero;
+    for (var step = 1u; step <= steps; step += 1u) {
         let x = word.x + step / 32u;
         let part = step % 32u;
         var from_right = row_word(word.y, x) >> part;

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
-use naga::{AddressSpace, Module, ShaderStage, TypeInner};
+use naga::{AddressSpace, Block, Expression, Function, Handle, Module, ShaderStage, Statement, TypeInner};
 use sheetsplat::internals::gpu::shaders::{self, Shader};
 
 /// The capabilities of WebGPU core beyond naga's minimum: `pack2x16float` and its inverse, which WGSL always has.
@@ -251,6 +251,102 @@ fn entry_points_stay_within_default_limits() {
         }
     }
     assert_none(&failures);
+}
+
+/// Lavapipe inserts the values of uniforms that alone decide a branch into a stage, and compiles it again for every draw (`start` in
+/// `shaders/shared/frame.wgsl`).
+#[test]
+fn no_branch_depends_on_uniforms_alone() {
+    let mut failures = Vec::new();
+    for shader in shaders::ALL {
+        let (module, _) = validated(shader).unwrap();
+        let functions = module.functions.iter().map(|(_, function)| function);
+        for function in functions.chain(module.entry_points.iter().map(|entry| &entry.function)) {
+            let mut conditions = Vec::new();
+            add_conditions(&function.body, &mut conditions);
+            for condition in conditions {
+                if (Decided { of_uniform: true, of_other: false }) != decided(&module, function, condition) {
+                    continue;
+                }
+                let span = function.expressions.get_span(condition);
+                let (path, line) = shader.origin(span.location(&shader.source()).line_number);
+                failures.push(format!("shaders/{path}:{line}: a branch in {:?}", function.name));
+            }
+        }
+    }
+    failures.sort();
+    failures.dedup();
+    assert_none(&failures);
+}
+
+/// The expressions that decide which statements of a block are executed. An `&&` is a branch, too.
+fn add_conditions(block: &Block, conditions: &mut Vec<Handle<Expression>>) {
+    for statement in block {
+        match statement {
+            Statement::Block(inner) => add_conditions(inner, conditions),
+            Statement::If { condition, accept, reject } => {
+                conditions.push(*condition);
+                add_conditions(accept, conditions);
+                add_conditions(reject, conditions);
+            }
+            Statement::Switch { selector, cases } => {
+                conditions.push(*selector);
+                cases.iter().for_each(|case| add_conditions(&case.body, conditions));
+            }
+            Statement::Loop { body, continuing, break_if } => {
+                conditions.extend(break_if);
+                add_conditions(body, conditions);
+                add_conditions(continuing, conditions);
+            }
+            _ => {}
+        }
+    }
+}
+
+/// What the value of an expression depends on, apart from constants and local variables, which may count a loop that is unrolled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Decided {
+    /// On a uniform's value at a place that is known.
+    of_uniform: bool,
+    of_other: bool,
+}
+
+impl Decided {
+    const OTHER: Self = Self { of_uniform: false, of_other: true };
+
+    fn or(self, other: Self) -> Self {
+        Self { of_uniform: self.of_uniform | other.of_uniform, of_other: self.of_other | other.of_other }
+    }
+}
+
+fn decided(module: &Module, function: &Function, expression: Handle<Expression>) -> Decided {
+    let of = |expression: &Handle<Expression>| decided(module, function, *expression);
+    match &function.expressions[expression] {
+        Expression::Literal(_) | Expression::Constant(_) | Expression::Override(_) | Expression::ZeroValue(_) => {
+            Decided::default()
+        }
+        Expression::LocalVariable(_) => Decided::default(),
+        Expression::GlobalVariable(global) => match module.global_variables[*global].space {
+            AddressSpace::Uniform => Decided { of_uniform: true, of_other: false },
+            _ => Decided::OTHER,
+        },
+        Expression::Load { pointer } => of(pointer),
+        Expression::Access { base, index } => of(base).or(of(index)),
+        Expression::AccessIndex { base, .. } => of(base),
+        Expression::Splat { value, .. } => of(value),
+        Expression::Swizzle { vector, .. } => of(vector),
+        Expression::Compose { components, .. } => components.iter().map(of).fold(Decided::default(), Decided::or),
+        Expression::Unary { expr, .. } | Expression::As { expr, .. } => of(expr),
+        Expression::Binary { left, right, .. } => of(left).or(of(right)),
+        Expression::Select { condition, accept, reject } => of(condition).or(of(accept)).or(of(reject)),
+        Expression::Relational { argument, .. } => of(argument),
+        Expression::Math { arg, arg1, arg2, arg3, .. } => [Some(arg), arg1.as_ref(), arg2.as_ref(), arg3.as_ref()]
+            .into_iter()
+            .flatten()
+            .map(of)
+            .fold(Decided::default(), Decided::or),
+        _ => Decided::OTHER,
+    }
 }
 
 /// An entry point's workgroup size with the shader's own values of its overrides; the passes set the same.

@@ -35,20 +35,20 @@ fn place_of(point_px: vec2f) -> vec3f {
 fn shown_depths(point_px: vec2f) -> vec2f {
     let at = place_of(point_px);
     var depths = vec2f(-FAR, FAR);
-    // Neither a loop's end nor an `if` may depend on a uniform, for the reason given at `start`.
+    // Neither a loop's end nor an `if` may depend on a uniform, for the reason given at `start`; and `&&` is an `if`.
     for (var i = 0u; i < MOST_PLANES; i += 1u) {
         let distance = dot(cut.planes[2u * i].xyz, at);
         let slope = dot(cut.planes[2u * i + 1u].xyz, at);
         let crossing = -distance / slope;
         let is_plane = i < cut.plane_count;
-        depths.x = select(depths.x, max(depths.x, crossing), is_plane && slope > 0.0);
-        depths.y = select(depths.y, min(depths.y, crossing), is_plane && slope < 0.0);
-        depths.y = select(depths.y, -FAR, is_plane && slope == 0.0 && distance < 0.0);
+        depths.x = select(depths.x, max(depths.x, crossing), is_plane & (slope > 0.0));
+        depths.y = select(depths.y, min(depths.y, crossing), is_plane & (slope < 0.0));
+        depths.y = select(depths.y, -FAR, is_plane & (slope == 0.0) & (distance < 0.0));
     }
     let z = textureLoad(surfaces, vec2u(point_px) + cut.surface_origin, 0);
     let ndc = vec4f(at.xy, z, 1.0);
     let surface = dot(cut.surface_depth, ndc) / dot(cut.surface_w, ndc);
-    let is_surface = cut.has_surfaces != 0u && z != cut.no_surface;
+    let is_surface = (cut.has_surfaces != 0u) & (z != cut.no_surface);
     depths.y = select(depths.y, min(depths.y, surface), is_surface);
     let is_in_region = all(point_px > cut.region.xy) && all(point_px < cut.region.zw);
     return select(vec2f(FAR, -FAR), depths, is_in_region);
@@ -56,7 +56,7 @@ fn shown_depths(point_px: vec2f) -> vec2f {
 
 // Whether a slab whose middle has this sheet depth is composited (SPEC §11).
 fn is_drawn_slab(middle: f32) -> bool {
-    return cut.slabs.x < middle && middle < cut.slabs.y;
+    return (cut.slabs.x < middle) & (middle < cut.slabs.y);
 }
 
 // The share of the slab between two sheet depths that a ray from `ray.x` to `ray.y` shows. From what is missing, so that whole slabs are not
