@@ -22,6 +22,10 @@ const CHUNK: u32 = 64;
 const STRETCHES: u64 = 64;
 const STRETCH: u64 = 4096;
 
+/// The bytes between a box's rows in a file up to which rows are read together, and the most bytes that are, if they are several.
+const GAP: u64 = 4096;
+const RUN: u64 = 1 << 20;
+
 /// Where the samples of a file are.
 #[derive(Clone, Debug)]
 pub(super) struct Located {
@@ -135,35 +139,44 @@ impl Store for FileStore {
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
         let Located { path, at, samples, .. } = &self.located;
         check_box(path, &self.levels, level, (from, dims), values.len())?;
-        let mut file = self.access.open_to_look(path)?;
+        // Each run of rows is read at once, so that a buffer would only read more.
+        let mut file = self.access.open_to_look(path)?.reader.into_inner();
         let [nx, ny] = [samples.dims.x, samples.dims.y].map(u64::from);
         let bytes = samples.kind.bytes();
         // The samples of the voxels of a row, and of those between them.
         let length = (u64::from(dims.x - 1) * self.step + 1) * bytes;
-        let (mut code, mut read, mut row_values) = (Vec::new(), 0, Vec::new());
-        let rows = (0..dims.z).flat_map(|z| (0..dims.y).map(move |y| from + UVec3::new(0, y, z)));
-        for (row, first) in values.chunks_exact_mut(dims.x as usize).zip(rows) {
-            let [x, y, z] = first.to_array().map(u64::from);
+        let from_row_to_row = nx * self.step * bytes;
+        let at_once = match from_row_to_row - length.min(from_row_to_row) {
+            ..=GAP => 1 + RUN.saturating_sub(length) / from_row_to_row,
+            _ => 1,
+        };
+        let runs = (0..dims.z).flat_map(|z| (0..dims.y).step_by(at_once as usize).map(move |y| UVec3::new(0, y, z)));
+        let mut rows = values.chunks_exact_mut(dims.x as usize);
+        let (mut code, mut row_values) = (Vec::new(), Vec::new());
+        for first in runs {
+            let count = u64::from(dims.y - first.y).min(at_once);
+            let [x, y, z] = (from + first).to_array().map(u64::from);
             let sample = self.first + (x + nx * (y + ny * z)) * self.step;
-            file.reader.seek(SeekFrom::Start(at + sample * bytes)).map_err(io_error(path))?;
+            file.seek(SeekFrom::Start(at + sample * bytes)).map_err(io_error(path))?;
             code.clear();
-            file.reader.by_ref().take(length).read_to_end(&mut code).map_err(io_error(path))?;
-            if code.len() as u64 != length {
-                return Err(invalid(
-                    path,
-                    "data",
-                    format!("the end of the file before voxel {first}"),
-                    "the whole file",
-                ));
-            }
-            read += length;
-            row_values.clear();
-            samples.convert::<f32>(path, &code, &mut row_values, 0)?;
-            for (value, &found) in row.iter_mut().zip(row_values.iter().step_by(self.step as usize)) {
-                *value = found;
+            let run = (count - 1) * from_row_to_row + length;
+            code.reserve(run.min(RUN) as usize);
+            file.by_ref().take(run).read_to_end(&mut code).map_err(io_error(path))?;
+            for (number, row) in (0..count).zip(&mut rows) {
+                let begin = number * from_row_to_row;
+                let Some(code) = code.get(begin as usize..(begin + length) as usize) else {
+                    let voxel = from + first + UVec3::new(0, number as u32, 0);
+                    let found = format!("the end of the file before voxel {voxel}");
+                    return Err(invalid(path, "data", found, "the whole file"));
+                };
+                row_values.clear();
+                samples.convert::<f32>(path, code, &mut row_values, 0)?;
+                for (value, &found) in row.iter_mut().zip(row_values.iter().step_by(self.step as usize)) {
+                    *value = found;
+                }
             }
         }
-        Ok(read)
+        Ok(u64::from(dims.y) * u64::from(dims.z) * length)
     }
 
     fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError> {

@@ -46,6 +46,49 @@ fn boxes_of_uncompressed_files() {
     assert_holds(&store, &Volume::open_raw(&fixture("float32-big-7.raw"), &layout).unwrap(), "raw");
 }
 
+/// Rows that lie close together in a file are read at once, others one by one, as are those of long runs.
+#[test]
+fn rows_near_and_far_apart_are_read() {
+    let folder = Folder::new();
+    let path = folder.0.path().join("wide.raw");
+    let dims = UVec3::new(1500, 190, 3);
+    let sample = |index: u32| (index.wrapping_mul(40_503) >> 3) as u16;
+    let bytes: Vec<u8> = (0..dims.element_product()).flat_map(|index| sample(index).to_be_bytes()).collect();
+    fs::write(&path, &bytes).unwrap();
+    let layout = RawLayout { dims, sample_type: SampleType::U16, big_endian: true, offset: 0 };
+    let store = || open_raw_store(&path, &layout, &ReadOptions::default()).unwrap();
+    let read = |from: UVec3, box_dims: UVec3| {
+        let mut found = vec![0.0; box_dims.element_product() as usize];
+        store().read(0, from, box_dims, &mut found).map(|_| found).map_err(|error| error.to_string())
+    };
+    for (from, box_dims) in [
+        (UVec3::new(3, 5, 1), UVec3::new(2, 40, 2)),
+        (UVec3::ZERO, UVec3::new(64, 190, 3)),
+        (UVec3::new(700, 1, 0), UVec3::new(800, 189, 3)),
+        (UVec3::ZERO, dims),
+    ] {
+        let at = |index: u32| {
+            from + UVec3::new(index % box_dims.x, index / box_dims.x % box_dims.y, index / box_dims.x / box_dims.y)
+        };
+        let value = |voxel: UVec3| f32::from(sample(voxel.x + dims.x * (voxel.y + dims.y * voxel.z)));
+        let expected = (0..box_dims.element_product()).map(|index| value(at(index))).collect();
+        assert!(read(from, box_dims) == Ok(expected), "{box_dims} from {from}");
+    }
+    // Wider rows, whose box's rows lie further apart, of a file that was cut off after the first two planes.
+    let layout = RawLayout { dims: UVec3::new(5700, 50, 3), ..layout };
+    let store = open_raw_store(&path, &layout, &ReadOptions::default()).unwrap();
+    let mut found = [0.0; 3 * 50 * 2];
+    store.read(0, UVec3::new(5, 0, 0), UVec3::new(3, 50, 2), &mut found).unwrap();
+    for (number, row) in (0..).zip(found.chunks_exact(3)) {
+        let first = 5 + 5700 * (number % 50) + 5700 * 50 * (number / 50);
+        assert_eq!(row, [0, 1, 2].map(|x| f32::from(sample(first + x))), "row {number}");
+    }
+    fs::File::options().write(true).open(&path).unwrap().set_len(2 * (5700 * 50 * 2 + 7)).unwrap();
+    let mut found = [0.0; 3 * 50 * 3];
+    let error = store.read(0, UVec3::new(5, 0, 0), UVec3::new(3, 50, 3), &mut found).unwrap_err().to_string();
+    assert!(error.contains("found the end of the file before voxel [5, 0, 2], allowed: the whole file"), "{error}");
+}
+
 /// The identity is that of the samples, wherever the file is.
 #[test]
 fn files_of_other_samples_have_other_identities() {
