@@ -120,15 +120,13 @@ fn levels_larger_than_memory_are_streamed() {
     assert_eq!(["level", "chunks_total", "voxels_total"].map(|key| count(&small, key)), [1, 8, 48 * 48 * 48]);
     let stated = stats("--set image={width=20,height=20} --level 0");
     assert_eq!(count(&stated, "level"), 0);
-    folder
-        .run_with(
-            &two,
-            "",
-            &format!("render {ball} --backend reference -o no.npy --set image={{width=100,height=100}} --set splatting.compositing=minimum"),
-        )
-        .assert_failure(
-            2,
-            &["splatting.compositing: found \"minimum\" for a volume that is streamed by this backend, allowed: another"],
-        );
-    assert!(!folder.path("no.npy").exists());
+    // Another backend draws boxes of it.
+    let average = "--backend reference --set image={width=20,height=20} --level 0 --set splatting.compositing=average \
+                   --set transfer.opacity=[[0,0],[255,0.5]] --set transfer.color=[[0,[1,0.9,0.8]]] \
+                   --set camera.direction=[0.3,1,-0.4] --set camera.center=[0,0,0] --set camera.height=120";
+    folder.run_with(&two, "", &format!("render {ball} {average} -o boxes.npy")).assert_success();
+    folder.render(&format!("ball.zarr --set splatting.classification=before {average} -o whole.npy"));
+    let [(.., boxes), (.., whole)] = ["boxes.npy", "whole.npy"].map(|name| folder.read_npy(name));
+    let differences = boxes.as_flattened().iter().zip(whole.as_flattened()).map(|(a, b)| (a - b).abs());
+    assert!(differences.fold(0.0, f32::max) < 1e-6 && whole.iter().any(|pixel| pixel[3] > 0.01));
 }

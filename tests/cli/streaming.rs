@@ -62,8 +62,6 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
     run("--set splatting.classification=after --backend cpu -o after.png").assert_success();
     run("--set splatting.classification=after --set splatting.interpolation=exact --backend cpu -o no.png")
         .assert_failure(2, &["splatting.interpolation: found \"exact\" for a volume that is streamed, allowed: "]);
-    run("--set splatting.compositing=average --backend reference -o no.png")
-        .assert_failure(2, &["splatting.compositing: found \"average\" for a volume that is streamed by this backend"]);
     folder
         .run_with(&two, "", &format!("render {ball} --backend cpu --memory 3MiB -o no.png"))
         .assert_failure(2, &["bytes of memory, allowed: at most the memory limit of 3145728 bytes"]);

@@ -211,6 +211,7 @@ fn in_range(extremes: &mut [Extreme], own: [f32; 2], all: [f32; 2]) {
 }
 
 /// Checks that a scene can be drawn box by box by a backend.
+#[cfg_attr(not(feature = "cpu"), expect(unused_variables, reason = "only the native backend refuses settings"))]
 fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(), RenderError> {
     scene.check()?;
     check_grids((&volume.first, &volume.further))?;
