@@ -121,7 +121,7 @@ fn levels_larger_than_memory_are_streamed() {
     let stated = stats("--set image={width=20,height=20} --level 0");
     assert_eq!(count(&stated, "level"), 0);
     // Another backend draws boxes of it.
-    let average = "--backend reference --set image={width=20,height=20} --level 0 --set splatting.compositing=average \
+    let average = "--backend reference --set image={width=100,height=100} --level 0 --set splatting.compositing=average \
                    --set transfer.opacity=[[0,0],[255,0.5]] --set transfer.color=[[0,[1,0.9,0.8]]] \
                    --set camera.direction=[0.3,1,-0.4] --set camera.center=[0,0,0] --set camera.height=120";
     folder.run_with(&two, "", &format!("render {ball} {average} -o boxes.npy")).assert_success();
