@@ -84,7 +84,8 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     start(workgroup.z);
     // Every thread tests a run of bricks, at most 32 at a time, so that the results fit a word.
     var total = 0u;
-    let count = sheet_group.brick_count + zero;
+    // Plus a 0 as `start` needs it, which browsers know to be the same for all threads, as barriers follow.
+    let count = sheet_group.brick_count + workgroup.z;
     for (var base = 0u; base < count; base += WORKGROUP_SIZE * 32u) {
         let rest = min(count - base, WORKGROUP_SIZE * 32u);
         let run = (rest + WORKGROUP_SIZE - 1u) / WORKGROUP_SIZE;

@@ -29,7 +29,7 @@ macro_rules! text {
     };
 }
 
-/// The text of a file without comments, because a page's code must be short. Lines stay, so that messages name the right ones.
+/// The text of a file without comments and indents, because a page's code must be short. Lines stay, so that messages name the right ones.
 #[cfg(target_arch = "wasm32")]
 macro_rules! text {
     ($file:expr) => {{
@@ -45,12 +45,13 @@ macro_rules! text {
 
 #[cfg(target_arch = "wasm32")]
 mod comments {
-    /// The bytes of a text without its comments, and their number. WGSL has no strings.
+    /// The bytes of a text without its comments and indents, and their number. WGSL has no strings.
     pub(super) const fn without<const N: usize>(text: &str) -> ([u8; N], usize) {
         let (text, mut code, mut count, mut at, mut is_comment) = (text.as_bytes(), [0; N], 0, 0, false);
         while at < N {
             is_comment = text[at] != b'\n' && (is_comment || text[at] == b'/' && at + 1 < N && text[at + 1] == b'/');
-            if !is_comment {
+            let is_indent = text[at] == b' ' && (count == 0 || code[count - 1] == b'\n');
+            if !is_comment && !is_indent {
                 code[count] = text[at];
                 count += 1;
             }
