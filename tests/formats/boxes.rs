@@ -46,12 +46,12 @@ fn boxes_of_uncompressed_files() {
     assert_holds(&store, &Volume::open_raw(&fixture("float32-big-7.raw"), &layout).unwrap(), "raw");
 }
 
-/// Rows that lie close together in a file are read at once, others one by one, as are those of long runs.
+/// Rows that lie close together in a file are read at once, up to a length that a plane here exceeds, and others one by one.
 #[test]
 fn rows_near_and_far_apart_are_read() {
     let folder = Folder::new();
     let path = folder.0.path().join("wide.raw");
-    let dims = UVec3::new(1500, 190, 3);
+    let dims = UVec3::new(1500, 400, 3);
     let sample = |index: u32| (index.wrapping_mul(40_503) >> 3) as u16;
     let bytes: Vec<u8> = (0..dims.element_product()).flat_map(|index| sample(index).to_be_bytes()).collect();
     fs::write(&path, &bytes).unwrap();
@@ -63,8 +63,8 @@ fn rows_near_and_far_apart_are_read() {
     };
     for (from, box_dims) in [
         (UVec3::new(3, 5, 1), UVec3::new(2, 40, 2)),
-        (UVec3::ZERO, UVec3::new(64, 190, 3)),
-        (UVec3::new(700, 1, 0), UVec3::new(800, 189, 3)),
+        (UVec3::ZERO, UVec3::new(64, 400, 3)),
+        (UVec3::new(700, 1, 0), UVec3::new(800, 399, 3)),
         (UVec3::ZERO, dims),
     ] {
         let at = |index: u32| {
@@ -75,17 +75,17 @@ fn rows_near_and_far_apart_are_read() {
         assert!(read(from, box_dims) == Ok(expected), "{box_dims} from {from}");
     }
     // Wider rows, whose box's rows lie further apart, of a file that was cut off after the first two planes.
-    let layout = RawLayout { dims: UVec3::new(5700, 50, 3), ..layout };
+    let layout = RawLayout { dims: UVec3::new(6000, 100, 3), ..layout };
     let store = open_raw_store(&path, &layout, &ReadOptions::default()).unwrap();
-    let mut found = [0.0; 3 * 50 * 2];
-    store.read(0, UVec3::new(5, 0, 0), UVec3::new(3, 50, 2), &mut found).unwrap();
+    let mut found = [0.0; 3 * 100 * 2];
+    store.read(0, UVec3::new(5, 0, 0), UVec3::new(3, 100, 2), &mut found).unwrap();
     for (number, row) in (0..).zip(found.chunks_exact(3)) {
-        let first = 5 + 5700 * (number % 50) + 5700 * 50 * (number / 50);
+        let first = 5 + 6000 * (number % 100) + 6000 * 100 * (number / 100);
         assert_eq!(row, [0, 1, 2].map(|x| f32::from(sample(first + x))), "row {number}");
     }
-    fs::File::options().write(true).open(&path).unwrap().set_len(2 * (5700 * 50 * 2 + 7)).unwrap();
-    let mut found = [0.0; 3 * 50 * 3];
-    let error = store.read(0, UVec3::new(5, 0, 0), UVec3::new(3, 50, 3), &mut found).unwrap_err().to_string();
+    fs::File::options().write(true).open(&path).unwrap().set_len(2 * (6000 * 100 * 2 + 7)).unwrap();
+    let mut found = [0.0; 3 * 100 * 3];
+    let error = store.read(0, UVec3::new(5, 0, 0), UVec3::new(3, 100, 3), &mut found).unwrap_err().to_string();
     assert!(error.contains("found the end of the file before voxel [5, 0, 2], allowed: the whole file"), "{error}");
 }
 

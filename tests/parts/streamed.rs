@@ -139,16 +139,22 @@ fn boxes_that_show_nothing_are_not_read() {
     assert!(drawn.image.pixels.iter().all(|pixel| *pixel == drawn.image.pixels[0]));
 }
 
-/// Three layers along the view, of which an index tells that only the front one shows anything; but the value that a pixel chooses lies in the last one.
+/// Three layers along the view, of which an index tells that only the front one shows anything; but the value that a pixel chooses lies in the last one. The one between
+/// is thicker than boxes are, and a hole where values near it would tell of that one.
 #[test]
 fn values_without_opacity_count_where_one_is_chosen() {
     let layers = |values: [f32; 3]| {
-        let at = |index: u32| values[(index % 108 / 36) as usize] + (index / 108 % 36) as f32 / 10.0;
-        Volume::new("layers", UVec3::new(108, 36, 36), DVec3::ONE, (0..108 * 36 * 36).map(at).collect()).unwrap()
+        let at = |index: u32| values[(index % 180 / 36).div_ceil(3).min(2) as usize] + (index / 180 % 36) as f32 / 10.0;
+        Volume::new("layers", UVec3::new(180, 36, 36), DVec3::ONE, (0..180 * 36 * 36).map(at).collect()).unwrap()
     };
-    for (compositing, values) in
-        [("maximum", [150.0, 20.0, 240.0]), ("minimum", [150.0, 240.0, 20.0]), ("average", [150.0, 20.0, 110.0])]
-    {
+    let both = &[Backend::Reference, Backend::Gpu][..];
+    for (compositing, values, backends) in [
+        ("maximum", [150.0, 20.0, 240.0], both),
+        ("minimum", [150.0, 240.0, 20.0], both),
+        ("average", [150.0, 20.0, 110.0], both),
+        ("maximum", [150.0, f32::NAN, 240.0], &both[..1]),
+        ("minimum", [150.0, f32::NAN, 20.0], &both[..1]),
+    ] {
         let volume = layers(values);
         let sets = [
             "camera={direction=[1,0.02,0.03],height=30}",
@@ -161,7 +167,7 @@ fn values_without_opacity_count_where_one_is_chosen() {
             let index = StoreIndex::new(&store, "store", &|| {}).unwrap();
             IndexedStore::new(Arc::new(store), index, "index").unwrap()
         };
-        for backend in [Backend::Reference, Backend::Gpu] {
+        for &backend in backends {
             let headless = headless(backend);
             let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
             let drawn = headless.render_volume(streamed(&volume, indexed(), 1 << 18), &scene).unwrap();

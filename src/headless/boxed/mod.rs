@@ -133,7 +133,7 @@ struct Walk<'a> {
     chunks: Chunks<'a>,
     /// What draws the boxes.
     headless: &'a Headless,
-    /// The minimum and maximum of the values, or of the sample's.
+    /// The minimum and maximum of the first channel's values, or of its sample's; there is no other channel where pixels choose values.
     range: [f32; 2],
     parts: Vec<Part>,
     stats: Stats,
@@ -169,9 +169,11 @@ impl Walk<'_> {
 
     /// Draws a window from the voxels that it needs. A channel of which nothing is seen changes nothing, so that its table is left out.
     fn part(&mut self, (volume, channels): Filled, window: &Window) -> Result<Part, RenderError> {
-        let range = range_of(volume.values().iter());
+        // Means are noted as they are.
+        let is_choice = self.identity.has_extremes() && self.scene.splatting.compositing != Compositing::Average;
+        let range = if is_choice { range_of(volume.values().iter()) } else { None };
         let (mut content, stats) = self.headless.draw_box(volume, &self.scene.of_channels(&channels), window)?;
-        if let Some(range) = range.filter(|_| self.scene.splatting.compositing != Compositing::Average) {
+        if let Some(range) = range {
             in_range(&mut content.extremes, range, self.range);
         }
         let (counts, prepare_ms) = (self.stats.counts, self.stats.prepare_ms);
