@@ -143,8 +143,8 @@ def test_what_needs_all_values_is_refused(ball: pathlib.Path) -> None:
     for attempt in (lambda: volume.values, lambda: Volume(volume, spacing=2)):
         with pytest.raises(VolumeError, match="found a volume that is streamed"):
             attempt()
-    with pytest.raises(SceneError, match="splatting.compositing: found \"average\" for a volume that is streamed"):
-        View(volume, backend="reference", splatting={"compositing": "average"})
+    with pytest.raises(SceneError, match="splatting.interpolation: found \"exact\" for a volume that is streamed"):
+        View(volume, backend="reference", splatting={"classification": "after", "interpolation": "exact"})
     with pytest.raises(SceneError, match=r"memory: found \"2XB\", allowed: a number of bytes"):
         Volume(ball, memory="2XB")
     assert not Volume(ball, memory=1 << 23).streamed

@@ -202,7 +202,7 @@ impl Volume {
         spacing: DVec3,
         values: impl Into<Values>,
     ) -> Result<Self, VolumeError> {
-        let mut values: Values = values.into();
+        let values: Values = values.into();
         let invalid = |field: &str, found: String, allowed: &str| invalid(origin, field, found, allowed.to_owned());
         let grid = Grid::new(dims, spacing);
         grid.check().map_err(|error| refused(origin, error))?;
@@ -211,14 +211,21 @@ impl Volume {
         if found != count as usize {
             return Err(invalid("data", format!("{found} values"), &format!("{count} values")));
         }
-        let holes = values.punch_holes();
-        if holes == u64::from(count) {
+        let volume = Self::punched(grid, values.narrowed());
+        if volume.holes == u64::from(count) {
             return Err(invalid("data", "only NaN or infinite samples".to_owned(), "at least one finite sample"));
         }
-        Ok(Self { holes, ..Self::piece(grid, values.narrowed()) })
+        Ok(volume)
     }
 
-    /// A piece of a volume, with values that are finite or NaN already. They are kept as they are.
+    /// A volume with holes where samples are NaN or infinite, which may be all.
+    pub(crate) fn punched(grid: Grid, values: impl Into<Values>) -> Self {
+        let mut values = values.into();
+        let holes = values.punch_holes();
+        Self { holes, ..Self::piece(grid, values) }
+    }
+
+    /// A piece of a volume, with values that are finite or NaN already. They are kept as they are, and its holes are not counted.
     pub(crate) fn piece(grid: Grid, values: impl Into<Values>) -> Self {
         Self {
             grid,

@@ -48,20 +48,19 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
             values[first..first + row.len()].copy_from_slice(row);
         }
     }
-    let count = values.len() as u64;
-    let mut values = Values::from(values);
-    let holes = values.punch_holes();
-    if holes == count {
-        let found = "only NaN or infinite samples".to_owned();
-        return Err(invalid(origin, "data", found, "at least one finite sample".to_owned()));
-    }
     let spacing = level.grid.spacing * f64::from(step);
     // The first voxel of the sample is the level's first.
     let center = |grid: &Grid| grid.center() * grid.spacing;
     let grid = Grid::new(dims, spacing);
     let place: DVec3 = level.grid.place() + center(&grid) - center(&level.grid);
     let grid = if number == 0 && step == 1 { level.grid } else { grid.coarser_than(&levels[0].grid, place) };
-    Volume { holes, reads: Some(reads), ..Volume::piece(grid, values.narrowed()) }.stating(origin, store.facts())
+    let count = values.len() as u64;
+    let volume = Volume::punched(grid, Values::from(values).narrowed());
+    if volume.holes == count {
+        let found = "only NaN or infinite samples".to_owned();
+        return Err(invalid(origin, "data", found, "at least one finite sample".to_owned()));
+    }
+    Volume { reads: Some(reads), ..volume }.stating(origin, store.facts())
 }
 
 /// The voxels of a sample that lie in one chunk: the first one, how many there are along each axis, and their values.

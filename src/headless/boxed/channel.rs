@@ -89,12 +89,10 @@ impl<'a> ChannelChunks<'a> {
         if !self.is_visible(within)? {
             return Ok(None);
         }
-        let mut values = self.values.read(within)?;
-        values.iter_mut().filter(|value| !value.is_finite()).for_each(|value| *value = f32::NAN);
-        if !self.counts_all && values.iter().all(|value| value.is_nan()) {
+        let volume = Volume::punched(*grid, self.values.read(within)?);
+        if !self.counts_all && volume.holes() == within.voxels() {
             return Ok(None);
         }
-        let volume = Volume::piece(*grid, values);
         let Some(labels) = &mut self.labels else { return Ok(Some(volume)) };
         let origin = labels.of.origin.clone();
         let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read(within)?)?;
