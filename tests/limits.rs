@@ -128,7 +128,7 @@ fn small_bindings_split_voxels_and_image() {
         let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
         let small = open(limits, Features::FLOAT32_BLENDABLE, None).unwrap();
         assert_eq!(small.device().limits().max_storage_buffer_binding_size, bytes, "wgpu gave what was asked for");
-        let lists = BrickLists::upload(small.device(), volume.grid(), &voxels);
+        let lists = BrickLists::upload(small.device(), BrickList::new(volume.grid(), &voxels));
         assert!(lists.lists.len() > 2, "{} lists", lists.lists.len());
         assert_eq!(lists.len(), voxels.len() as u64);
         let of_lists: Vec<Brick> = lists.bricks().flatten().copied().collect();

@@ -8,6 +8,7 @@
 
 use glam::UVec3;
 
+use crate::lists::brick::{BrickList, SIDE};
 use crate::lists::iso_range::ValueSet;
 use crate::parallel::prelude::*;
 use crate::settings::splatting::Compositing;
@@ -49,9 +50,6 @@ impl Bearing {
         }
     }
 }
-
-/// The side of a brick in voxels.
-const SIDE: u32 = 4;
 
 /// The minimum and maximum coefficient around every brick of a grid, in memory order of the bricks. Holes are ignored.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,19 +93,25 @@ impl BrickRanges {
         self.ranges.par_iter().map(is_shown).collect()
     }
 
-    /// The voxels of the bricks that are wanted, without holes, in memory order.
-    pub fn voxels(&self, volume: &Volume, is_wanted: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
+    /// The bricks that are wanted, without holes.
+    pub fn brick_list(&self, volume: &Volume, is_wanted: impl Fn(usize) -> bool + Sync) -> BrickList {
         let (dims, values) = (self.grid.dims, volume.values());
         let bricks = dims.map(|n| n.div_ceil(SIDE));
-        let row = |at: u32| {
-            let (y, z) = (at % dims.y, at / dims.y);
+        BrickList::by_rows(&self.grid, |y, z, flags| {
             let first = bricks.x * (y / SIDE + bricks.y * (z / SIDE));
-            let is_wanted = &is_wanted;
-            let wanted = (0..bricks.x).filter(move |x| is_wanted((first + x) as usize));
-            let voxels = wanted.flat_map(move |x| x * SIDE..((x + 1) * SIDE).min(dims.x)).map(move |x| at * dims.x + x);
-            voxels.filter(move |&voxel| !values.at(voxel as usize).is_nan()).collect::<Vec<u32>>()
-        };
-        (0..dims.y * dims.z).into_par_iter().map(row).collect::<Vec<_>>().concat()
+            let row = (dims.x * (y + dims.y * z)) as usize;
+            for (at, flags) in
+                flags.chunks_mut(SIDE as usize).enumerate().filter(|(at, _)| is_wanted(first as usize + at))
+            {
+                let from = row + at * SIDE as usize;
+                values.slice(from..from + flags.len()).flag(flags, |value| !value.is_nan());
+            }
+        })
+    }
+
+    /// Their voxels, in memory order.
+    pub fn voxels(&self, volume: &Volume, is_wanted: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
+        self.brick_list(volume, is_wanted).voxels()
     }
 }
 

@@ -12,7 +12,7 @@ use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
-use crate::lists::classify::{channels, classify};
+use crate::lists::classify::{brick_list, channels};
 use crate::scene::Scene;
 use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
@@ -97,7 +97,7 @@ impl List {
             return Ok(Self::After(coefficients.collect::<Result<_, _>>()?));
         }
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-        let bricks = BrickList::new(volume.grid(), &classify(volume, transfer, &clipped));
+        let bricks = brick_list(volume, transfer, &clipped);
         let materials = Materials::new(bricks.bricks().len(), channels(volume, transfer).count());
         Ok(Self::Before(Box::new(bricks), materials))
     }

@@ -7,7 +7,6 @@ use wgpu::{Buffer, BufferUsages, Device, Queue};
 use super::bindings::uploaded;
 use super::layout::{Brick, BrickState, Splat, Visit};
 use crate::lists::brick::{self, BRICK_VOXELS, BrickList};
-use crate::volume::Grid;
 
 /// The bricks of all voxels that take part, in lists whose records each fit one storage binding.
 #[derive(Debug)]
@@ -39,17 +38,13 @@ pub struct BrickBuffer {
 }
 
 impl BrickLists {
-    /// Uploads the bricks of voxels, given as indices into the volume.
-    pub fn upload(device: &Device, grid: &Grid, voxels: &[u32]) -> Self {
-        Self::of(device, BrickList::new(grid, voxels))
+    /// Lists bricks, which the next [`Self::flush`] uploads.
+    pub fn new(bricks: BrickList) -> Self {
+        Self { lists: Vec::new(), bricks, state: State::Full }
     }
 
-    /// Lists the bricks of voxels, given as indices into the volume, which the next [`Self::flush`] uploads.
-    pub fn new(grid: &Grid, voxels: &[u32]) -> Self {
-        Self { lists: Vec::new(), bricks: BrickList::new(grid, voxels), state: State::Full }
-    }
-
-    fn of(device: &Device, bricks: BrickList) -> Self {
+    /// Uploads bricks.
+    pub fn upload(device: &Device, bricks: BrickList) -> Self {
         let (ranges, capacity) = split(&device.limits(), bricks.bricks().len());
         let lists = ranges.map(|range| BrickBuffer::upload(device, range, capacity, &bricks)).collect();
         Self { lists, bricks, state: State::Current }
@@ -88,9 +83,9 @@ impl BrickLists {
         };
     }
 
-    /// Takes the bricks of other voxels instead; the next [`Self::flush`] uploads them all.
-    pub fn replace(&mut self, grid: &Grid, voxels: &[u32]) {
-        self.bricks = BrickList::new(grid, voxels);
+    /// Takes other bricks instead; the next [`Self::flush`] uploads them all.
+    pub fn replace(&mut self, bricks: BrickList) {
+        self.bricks = bricks;
         self.lists.truncate(1);
         self.lists.iter_mut().for_each(|list| list.range = 0..self.bricks.bricks().len());
         self.state = State::Full;
@@ -116,7 +111,7 @@ impl BrickLists {
                     queue.write_buffer(&list.buffer, 0, bytemuck::cast_slice(bricks));
                 }
             }
-            State::Full => *self = Self::of(device, self.bricks.compacted()),
+            State::Full => *self = Self::upload(device, self.bricks.compacted()),
         }
         self.state = State::Current;
     }

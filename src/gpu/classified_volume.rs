@@ -16,7 +16,7 @@ use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks, ShownInChannel};
 use crate::gpu::volume_texture::OwnColors;
 use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
-use crate::lists::classify::{channels, classify, in_rows, takes_part};
+use crate::lists::classify::{TakingPart, brick_list, channels, in_rows};
 use crate::lists::iso_range::ValueSet;
 use crate::lists::quad_plan::{Overlaps, tile_grid};
 use crate::lists::value_list::ValueList;
@@ -87,8 +87,8 @@ impl ClassifiedVolume {
             joining: Joining::of(compositing, classification),
             shown: None,
         };
-        let voxels = classified.taking_part();
-        classified.lists = voxels.iter().map(|voxels| BrickLists::upload(device, classified.grid(), voxels)).collect();
+        let bricks = classified.taking_part();
+        classified.lists = bricks.into_iter().map(|bricks| BrickLists::upload(device, bricks)).collect();
         classified
     }
 
@@ -106,19 +106,18 @@ impl ClassifiedVolume {
 
     /// Lists all voxels again, which the next frame uploads.
     fn list_again(&mut self) {
-        let grid = *self.grid();
-        self.lists = self.taking_part().iter().map(|voxels| BrickLists::new(&grid, voxels)).collect();
+        self.lists = self.taking_part().into_iter().map(BrickLists::new).collect();
         self.revision += 1;
         self.shown = None;
     }
 
-    /// The voxels that each list holds; with [`Classification::After`] none yet.
-    fn taking_part(&self) -> Vec<Vec<u32>> {
-        let voxels = |(volume, transfer): (&Volume, Cow<'_, TransferFunction>)| match self.classification {
-            Classification::After => Vec::new(),
-            _ => classify(volume, &transfer, &self.clipped),
+    /// The bricks that each list holds; with [`Classification::After`] none yet.
+    fn taking_part(&self) -> Vec<BrickList> {
+        let bricks = |(volume, transfer): (&Volume, Cow<'_, TransferFunction>)| match self.classification {
+            Classification::After => BrickList::new(volume.grid(), &[]),
+            _ => brick_list(volume, &transfer, &self.clipped),
         };
-        self.listed().map(voxels).collect()
+        self.listed().map(bricks).collect()
     }
 
     /// The number of channels that are drawn.
@@ -163,9 +162,9 @@ impl ClassifiedVolume {
             return;
         }
         let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
-        let (volume, grid) = (Arc::clone(self.volume()), *self.grid());
+        let volume = Arc::clone(self.volume());
         for ((list, channel), of) in self.lists.iter_mut().zip(volume.channels()).zip(&shown.channels) {
-            list.replace(&grid, &of.voxels(channel));
+            list.replace(of.brick_list(channel));
         }
         self.revision += 1;
         self.shown = Some(shown);
@@ -176,9 +175,8 @@ impl ClassifiedVolume {
         match needs {
             Some(needs) if self.shown.as_ref().is_none_or(|shown| shown.needs != *needs) => {
                 let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
-                let bricks = |(channel, of): (&Volume, &ShownInChannel)| {
-                    SettledBricks::of(limits, BrickList::new(self.grid(), &of.voxels(channel)))
-                };
+                let bricks =
+                    |(channel, of): (&Volume, &ShownInChannel)| SettledBricks::of(limits, of.brick_list(channel));
                 self.volume().channels().zip(&shown.channels).map(bricks).collect()
             }
             _ => self.lists.iter().map(|list| list.settled(limits)).collect(),
@@ -365,9 +363,8 @@ impl ClassifiedVolume {
     fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
         let changes = |(listed, (volume, transfer)): (&BrickLists, (&Volume, Cow<'_, TransferFunction>))| {
             // The closures get no types of wgpu, which in a browser belong to one thread.
-            let (clipped, listed, transfer) = (&self.clipped, listed.list(), &*transfer);
-            let takes_part =
-                |index: u32| clipped.contain(volume.grid().voxel_at(index)) && takes_part(volume, transfer, index);
+            let (clipped, listed, of) = (&self.clipped, listed.list(), TakingPart::new(volume, &transfer));
+            let takes_part = |index: u32| clipped.contain(volume.grid().voxel_at(index)) && of.takes_part(index);
             let changed = candidates.par_iter().filter(|&&index| takes_part(index) != listed.contains(index));
             changed.copied().partition(|&index| !listed.contains(index))
         };

@@ -6,6 +6,7 @@ use glam::UVec3;
 
 use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::gpu::coefficients::Coefficients;
+use crate::lists::brick::BrickList;
 use crate::lists::classify::channels;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{ValueSlice, Volume};
@@ -60,9 +61,9 @@ impl ShownBricks {
 }
 
 impl ShownInChannel {
-    /// The voxels of these bricks, without holes.
-    pub(super) fn voxels(&self, channel: &Volume) -> Vec<u32> {
+    /// These bricks, without holes.
+    pub(super) fn brick_list(&self, channel: &Volume) -> BrickList {
         let are_shown = &self.are_shown;
-        self.ranges.voxels(channel, |brick| are_shown[brick])
+        self.ranges.brick_list(channel, |brick| are_shown[brick])
     }
 }

@@ -4,6 +4,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, UVec3};
 
+use crate::parallel::prelude::*;
 use crate::volume::Grid;
 
 /// The side of a brick in voxels.
@@ -49,6 +50,50 @@ impl BrickList {
         let mut list = Self { grid: *grid, numbers: vec![NONE; count], bricks: Vec::new() };
         list.change(voxels, &[]);
         list.compacted()
+    }
+
+    /// The bricks of the voxels whose flags are set by `flag`, which is given y and z of a row of voxels along x and their flags.
+    pub fn by_rows(grid: &Grid, flag: impl Fn(u32, u32, &mut [bool]) + Sync) -> Self {
+        let across = bricks_per_axis(grid);
+        let row = |row: u32| {
+            let origin = SIDE * UVec3::new(0, row % across.y, row / across.y);
+            let (mut masks, mut flags) = (vec![0_u64; across.x as usize], vec![false; (SIDE * across.x) as usize]);
+            for slot in (0..BRICK_VOXELS).step_by(SIDE as usize) {
+                let UVec3 { y, z, .. } = origin + in_brick(slot);
+                if y < grid.dims.y && z < grid.dims.z {
+                    flags.fill(false);
+                    flag(y, z, &mut flags[..grid.dims.x as usize]);
+                    for (mask, flags) in masks.iter_mut().zip(flags.chunks_exact(SIDE as usize)) {
+                        let bits = flags.iter().rev().fold(0, |bits, &flag| bits << 1 | u64::from(flag));
+                        *mask |= bits << slot;
+                    }
+                }
+            }
+            let bricks = masks.into_iter().zip((0..).step_by(SIDE as usize)).filter(|&(mask, _)| mask != 0);
+            let brick = |(mask, x): (u64, u32)| {
+                let present = [mask as u32, (mask >> 32) as u32];
+                let mut brick = Brick { present, x, y: origin.y, z: origin.z, extent: UNKNOWN };
+                fit(&mut brick);
+                brick
+            };
+            bricks.map(brick).collect::<Vec<_>>()
+        };
+        let rows: Vec<Vec<Brick>> = (0..across.y * across.z).into_par_iter().map(row).collect();
+        let bricks = rows.concat();
+        let mut numbers = vec![NONE; across.element_product() as usize];
+        for (brick, number) in bricks.iter().zip(0..) {
+            let at = origin(brick) / SIDE;
+            numbers[(at.x + across.x * (at.y + across.y * at.z)) as usize] = number;
+        }
+        Self { grid: *grid, numbers, bricks }
+    }
+
+    /// The voxels, as indices into the volume, in memory order.
+    pub fn voxels(&self) -> Vec<u32> {
+        let mut all: Vec<u32> =
+            self.bricks.iter().flat_map(voxels).map(|(_, voxel)| self.grid.index_of(voxel)).collect();
+        all.par_sort_unstable();
+        all
     }
 
     /// The bricks.

@@ -2,8 +2,7 @@
 
 use glam::UVec3;
 
-use super::classify::{channels, takes_part};
-use super::iso_range::ValueSet;
+use super::classify::TakingPart;
 use crate::parallel::prelude::*;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
@@ -19,24 +18,16 @@ pub(crate) fn of_voxels(
 ) -> Option<[UVec3; 2]> {
     let dims = volume.dims();
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
-    let set = ValueSet::of(transfer);
-    let is_by_value = transfer.labels.is_empty() && transfer.gradient_opacity.is_none() && volume.colors().is_none();
-    let needs_more = !is_by_value || channels(volume, transfer).nth(1).is_some();
+    let taking_part = TakingPart::new(volume, transfer);
     // Counts of voxels by x and by y over the slices of a thread, and for every slice.
     let zeros = || (vec![0_u64; nx], vec![0_u64; ny], vec![0_u64; nz]);
     let counted = (0..dims.z).into_par_iter().fold(zeros, |(mut xs, mut ys, mut zs), z| {
+        let mut flags = vec![false; nx];
         for y in 0..dims.y {
-            let row = dims.x * (y + dims.y * z);
-            let mut in_row = 0;
-            for x in clipped.in_row(y, z, dims.x) {
-                let index = row + x;
-                let is_shown = match needs_more {
-                    true => takes_part(volume, transfer, index),
-                    false => set.contains(volume.values().at(index as usize)),
-                };
-                xs[x as usize] += u64::from(is_shown);
-                in_row += u64::from(is_shown);
-            }
+            flags.fill(false);
+            taking_part.flag(dims.x * (y + dims.y * z), clipped.in_row(y, z, dims.x), &mut flags);
+            xs.iter_mut().zip(&flags).for_each(|(x, &flag)| *x += u64::from(flag));
+            let in_row = flags.iter().map(|&flag| u64::from(flag)).sum::<u64>();
             ys[y as usize] += in_row;
             zs[z as usize] += in_row;
         }

@@ -5,6 +5,7 @@
 use std::ops::Range;
 
 use crate::settings::transfer_function::{Ramp, Tables, TransferFunction};
+use crate::volume::ValueSlice;
 
 /// A set of values: ranges of ordinals that are ascending, disjoint and not adjacent.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -126,6 +127,14 @@ impl ValueSet {
     pub fn contains(&self, value: f32) -> bool {
         let at = ordinal(value);
         self.ranges.iter().any(|range| range.contains(&at))
+    }
+
+    /// Sets the flags of those of as many values that are in the set.
+    pub fn flag(&self, values: ValueSlice, flags: &mut [bool]) {
+        for range in &self.ranges {
+            let (start, length) = (range.start, range.end - range.start);
+            values.flag(flags, |value| ordinal(value).wrapping_sub(start) < length);
+        }
     }
 }
 

@@ -6,8 +6,8 @@ use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::kernel::Kernel;
-use crate::lists::brick::{self, Brick, BrickList};
-use crate::lists::classify::classify;
+use crate::lists::brick::{self, Brick};
+use crate::lists::classify::brick_list;
 use crate::scene::{OpenVolume, Scene};
 use crate::settings::window::{Region, Window};
 
@@ -76,7 +76,7 @@ impl Work {
         let amounts = vec![0.0; cells[0] * cells[1] * bins];
         let mut work = Self { size, cell, cells, slabs, bins, amounts };
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-        let bricks = BrickList::new(volume.grid(), &classify(volume, &transfer, &clipped));
+        let bricks = brick_list(volume, &transfer, &clipped);
         let support = Kernel::new(scene.splatting.radius, scene.splatting.falloff).support();
         bricks.bricks().iter().for_each(|brick| work.add(brick, &view, support));
         Ok(work)

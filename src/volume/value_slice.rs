@@ -103,6 +103,13 @@ impl<'a> ValueSlice<'a> {
         for_type!(Self, self, values => values[ends].into())
     }
 
+    /// Sets the flags of those of as many values that a test is true of.
+    pub(crate) fn flag(self, flags: &mut [bool], test: impl Fn(f32) -> bool) {
+        for_type!(Self, self, values => {
+            flags.iter_mut().zip(values).for_each(|(flag, value)| *flag |= test(value.to_f32()));
+        });
+    }
+
     /// The values, one after the other.
     pub fn iter(self) -> ValueIter<'a> {
         ValueIter(match self {

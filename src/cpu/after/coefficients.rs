@@ -172,7 +172,7 @@ impl Coefficients {
         let are_shown = ranges.of_kernels.shown(volume, transfer, bearing);
         let bricks = match self.shown.take() {
             Some(old) if old.are_shown == are_shown => old.bricks,
-            _ => BrickList::new(grid, &ranges.of_kernels.voxels(volume, |brick| are_shown[brick])),
+            _ => ranges.of_kernels.brick_list(volume, |brick| are_shown[brick]),
         };
         let is_wanted = match is_choice(compositing) {
             // A value without an opacity may be chosen.

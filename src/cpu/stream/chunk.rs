@@ -9,7 +9,7 @@ use super::source::{Source, Splats};
 use crate::cpu::bin::{Placed, place_brick};
 use crate::cpu::count::Drawn;
 use crate::lists::brick::{self, Brick, BrickList};
-use crate::lists::classify::takes_part;
+use crate::lists::classify::TakingPart;
 use crate::lists::quad_plan::Overlaps;
 use crate::volume::{Grid, Volume, VolumeError};
 
@@ -144,11 +144,14 @@ fn bricks_of(source: &Source, splats: &Splats, number: u32, (volume, low): (&Vol
     let Splats { transfer, clipped, .. } = splats;
     let (from, dims) = source.bounds(number);
     let own = Grid { dims, ..source.grid };
-    let takes_part =
-        |voxel: &UVec3| clipped.contain(*voxel) && takes_part(volume, transfer, volume.grid().index_of(*voxel - low));
-    let voxels = (0..dims.element_product()).map(|index| (index, from + own.voxel_at(index)));
-    let taking_part: Vec<u32> = voxels.filter(|(_, voxel)| takes_part(voxel)).map(|(index, _)| index).collect();
-    let mut bricks = BrickList::new(&own, &taking_part).bricks().to_vec();
+    let taking_part = TakingPart::new(volume, transfer);
+    let list = BrickList::by_rows(&own, |y, z, flags| {
+        let at = from + UVec3::new(0, y, z);
+        let inside = clipped.in_row(at.y, at.z, from.x + dims.x);
+        let inside = inside.start.saturating_sub(from.x)..inside.end.saturating_sub(from.x);
+        taking_part.flag(volume.grid().index_of(at - low), inside, flags);
+    });
+    let mut bricks = list.bricks().to_vec();
     for brick in &mut bricks {
         (brick.x, brick.y, brick.z) = (brick.x + from.x, brick.y + from.y, brick.z + from.z);
     }

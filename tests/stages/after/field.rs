@@ -5,6 +5,7 @@ use std::cell::RefCell;
 use bytemuck::Zeroable;
 use glam::{DVec3, DVec4};
 use sheetsplat::headless::readback;
+use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
 use sheetsplat::internals::gpu::layout::{FieldVoxel, SheetGroup};
 use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
@@ -83,7 +84,7 @@ fn any_list(prepared: &Prepared<'_>) -> CullList {
         planes: None,
     };
     let grid = Grid::new(glam::UVec3::ONE, DVec3::ONE);
-    let lists = BrickLists::upload(device, &grid, &[0]);
+    let lists = BrickLists::upload(device, BrickList::new(&grid, &[0]));
     Cull::new(device, 1).prepare(device, buffers, &lists.lists[0], &storage, (1, 1), None).unwrap()
 }
 

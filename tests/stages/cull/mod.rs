@@ -79,7 +79,7 @@ impl<'a> Culling<'a> {
         let (device, sheets) = (gpu.device(), kind.sheets());
         let size = [scene.image.width, scene.image.height];
         let view = ViewGeometry::new(grid, &scene.camera, &scene.splatting, size).unwrap();
-        let lists = BrickLists::upload(device, grid, voxels);
+        let lists = BrickLists::upload(device, BrickList::new(grid, voxels));
         let bricks = lists.bricks().next().unwrap().to_vec();
         let plan = FramePlan::new(
             [bricks.as_slice()],

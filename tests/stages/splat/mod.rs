@@ -10,6 +10,7 @@ use std::ops::Deref;
 use bytemuck::Zeroable;
 use glam::{DVec2, DVec3, DVec4, UVec3};
 use sheetsplat::headless::{GpuHeadless, readback};
+use sheetsplat::internals::brick::BrickList;
 use sheetsplat::internals::footprint::{FootprintTable, SECTION_SIZE, SECTIONS, section_extent, section_spacing};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
 use sheetsplat::internals::gpu::footprint_texture::FootprintTexture;
@@ -58,7 +59,7 @@ impl<'a> Stages<'a> {
             planes: None,
         };
         let grid = Grid::new(UVec3::ONE, DVec3::ONE);
-        let lists = BrickLists::upload(device, &grid, &[0]);
+        let lists = BrickLists::upload(device, BrickList::new(&grid, &[0]));
         let list = Cull::new(device, sheets).prepare(device, shared, &lists.lists[0], &storage, (1, 1), None).unwrap();
         let splat = Stage::new(device, TextureFormat::Rgba32Float, sheets);
         Self { gpu, sheets, splat, list: RefCell::new(list) }
