@@ -263,9 +263,24 @@ impl CpuRenderer {
         Ok((part, statistics(self.simd, self.size(), counts, start)))
     }
 
-    /// Draws the pixels of a part, and returns them with statistics.
-    pub(crate) fn draw_content(&mut self, window: &Window) -> Result<(Content, Stats), RenderError> {
+    /// Draws a window to those of its pixels, row by row, that are not closed, and returns them with statistics.
+    pub(crate) fn draw_box(
+        &mut self,
+        window: &Window,
+        closed: Option<&[bool]>,
+    ) -> Result<(Content, Stats), RenderError> {
         let start = Instant::now();
+        self.surfaces = closed.map(|closed| {
+            // In front of everything.
+            let depth = |&closed: &bool| if closed { f32::NEG_INFINITY } else { f32::INFINITY };
+            let (Region { x, y, width, .. }, [across, down]) = (window.region, self.size());
+            let mut depths = vec![f32::INFINITY; across as usize * down as usize];
+            for (row, closed) in (y..).zip(closed.chunks_exact(width as usize)) {
+                let row = &mut depths[(x + row * across) as usize..][..width as usize];
+                row.iter_mut().zip(closed).for_each(|(to, closed)| *to = depth(closed));
+            }
+            depths.into()
+        });
         let (Drawing { content, counts, .. }, _) = self.drawing(window.clone(), true)?;
         Ok((content, statistics(self.simd, self.size(), counts, start)))
     }

@@ -35,6 +35,12 @@ pub struct SurfaceDepths {
     pub none: f64,
 }
 
+impl SurfaceDepths {
+    /// In front of everything where the texture's value is not 1.
+    pub(crate) const IN_FRONT: Self =
+        Self { depth: DVec4::new(0.0, 0.0, 0.0, -1e9), w: DVec4::new(0.0, 0.0, 0.0, 1.0), none: 1.0 };
+}
+
 impl Surfaces {
     /// Checks the texture and the matrix. Whether the projection is the camera's is checked when a frame is prepared.
     ///

@@ -10,6 +10,7 @@ pub(crate) mod fault;
 pub mod footprint_texture;
 pub mod gathered_layout;
 pub(crate) mod gpu_volume;
+pub(crate) mod hiding;
 pub mod layout;
 pub(crate) mod options;
 pub(crate) mod placement;

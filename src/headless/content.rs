@@ -1,9 +1,11 @@
 //! Reading back the pixels of a part of an image (SPEC §11).
 
-use wgpu::{Device, Queue};
+use bytemuck::Pod;
+use wgpu::{Buffer, Device, Queue};
 
 use super::readback;
 use crate::error::RenderError;
+use crate::gpu::layout::Band;
 use crate::part::{Content, Extreme};
 use crate::rasterizer::carried::Carried;
 use crate::renderer::prepared_frame::{Drawing, PreparedFrame};
@@ -24,11 +26,9 @@ pub(super) fn content(
     region: &Region,
     chosen: Option<Compositing>,
 ) -> Result<Content, RenderError> {
-    let buffers = frame.compositing.bands.iter().map(|band| &band.acc);
     let mut colors = Vec::with_capacity(region.pixels());
-    for (band, buffer) in frame.compositing.bands.iter().zip(buffers) {
-        let pixels: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, buffer)?);
-        crop(&pixels, (frame, band.band.first_row), region, &mut colors);
+    for band in &frame.compositing.bands {
+        read_rows((device, queue), (frame, &band.band), (&band.acc, 0), region, &mut colors)?;
     }
     let extremes = match (chosen, frame.first_drawing().and_then(Drawing::carried)) {
         (Some(Compositing::Average), Some(carried)) => means((device, queue), frame, carried, region, &mut colors)?,
@@ -43,29 +43,37 @@ pub(super) fn content(
     Ok(Content { colors, extremes })
 }
 
-/// Appends those of a band's pixels that lie in a region.
-fn crop<T: Copy>(pixels: &[T], (frame, first_row): (&PreparedFrame, u32), region: &Region, cropped: &mut Vec<T>) {
-    let rows = (first_row as usize..).zip(pixels.chunks_exact(frame.compositing.size[0] as usize));
-    for (_, row) in rows.filter(|(y, _)| region.rows().contains(y)) {
-        cropped.extend_from_slice(&row[region.columns()]);
+/// Reads those of a band's pixels that lie in a region from one of a buffer's records of them all, and appends them.
+fn read_rows<T: Pod>(
+    (device, queue): (&Device, &Queue),
+    (frame, band): (&PreparedFrame, &Band),
+    (buffer, record): (&Buffer, u32),
+    region: &Region,
+    read: &mut Vec<T>,
+) -> Result<(), RenderError> {
+    let (first, end) = (region.y.max(band.first_row), (region.y + region.height).min(band.first_row + band.rows));
+    if first >= end {
+        return Ok(());
     }
+    let row = frame.compositing.size[0] as usize;
+    let bytes_before = |y: u32| u64::from(record * band.rows + y - band.first_row) * (row * size_of::<T>()) as u64;
+    let bytes = readback::buffer_part(device, queue, buffer, bytes_before(first)..bytes_before(end))?;
+    let pixels: Vec<T> = bytemuck::pod_collect_to_vec(&bytes);
+    pixels.chunks_exact(row).for_each(|row| read.extend_from_slice(&row[region.columns()]));
+    Ok(())
 }
 
 /// The records that the pixels of a region carry in a volume of one channel, and those of its own colours, if it has any.
 fn records(
-    (device, queue): (&Device, &Queue),
+    device: (&Device, &Queue),
     frame: &PreparedFrame,
     carried: &Carried,
     region: &Region,
 ) -> Result<[Vec<[u32; 4]>; 2], RenderError> {
     let mut records = [const { Vec::new() }; 2];
     for (band, buffer) in frame.compositing.bands.iter().zip(&carried.bands) {
-        let words: Vec<[u32; 4]> = bytemuck::pod_collect_to_vec(&readback::buffer(device, queue, buffer)?);
-        // The buffer may be larger than the band's records.
-        let size = band.band.rows as usize * frame.compositing.size[0] as usize;
-        let of_band = words.chunks_exact(size).take(carried.records as usize);
-        for (words, record) in of_band.zip(&mut records) {
-            crop(words, (frame, band.band.first_row), region, record);
+        for (record, number) in records.iter_mut().zip(0..carried.records) {
+            read_rows(device, (frame, &band.band), (buffer, number), region, record)?;
         }
     }
     Ok(records)

@@ -17,6 +17,7 @@ use crate::gpu::counts::PendingCounts;
 use crate::gpu::device::{DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
 use crate::gpu::gpu_volume::GpuVolume;
+use crate::gpu::hiding::{ClosedPixels, Hiding};
 use crate::gpu::options::{Blend, RendererOptions};
 use crate::gpu::placement::Placement;
 use crate::image::Image;
@@ -129,7 +130,7 @@ impl GpuHeadless {
     pub fn draw_part(&self, view: &mut SceneView, window: &Window) -> Result<(Part, Stats), RenderError> {
         part::check_sheets(view.volume.volume(), &view.scene)?;
         part::check(view.volume.volume(), &view.scene, window)?;
-        if view.surfaces.is_some() {
+        if view.hiding.is_some() {
             return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());
         }
         let (content, stats) = self.draw_content(view, window)?;
@@ -138,11 +139,28 @@ impl GpuHeadless {
         Ok((Part::new(of, &frame.view, window, content)?, stats))
     }
 
+    /// Draws a window of a box of voxels to those pixels, row by row, that are not closed.
+    ///
+    /// # Errors
+    /// As for [`Self::view`] and [`Self::draw`].
+    pub(super) fn draw_box(
+        &self,
+        volume: Volume,
+        scene: &Scene,
+        window: &Window,
+        closed: Option<&[bool]>,
+    ) -> Result<(Content, Stats), RenderError> {
+        let mut view = self.view(volume, scene)?;
+        let upload = |closed| ClosedPixels::upload(&self.device, &self.queue, &window.region, closed);
+        view.hiding = closed.map(upload).map(Hiding::Closed);
+        self.draw_content(&mut view, window)
+    }
+
     /// Draws the pixels of a part, without first hits, and returns them with statistics.
     ///
     /// # Errors
     /// As for [`Self::draw`].
-    pub(super) fn draw_content(&self, view: &mut SceneView, window: &Window) -> Result<(Content, Stats), RenderError> {
+    fn draw_content(&self, view: &mut SceneView, window: &Window) -> Result<(Content, Stats), RenderError> {
         let first_hit = view.first_hit.take();
         view.window = Some(window.clone());
         let drawn = scoped(&self.device, || self.draw_content_unscoped(view, window));

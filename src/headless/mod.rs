@@ -184,13 +184,19 @@ impl Headless {
         Ok(HeadlessView::new(ViewBackend::Boxed(Box::new(view)), None))
     }
 
-    /// Draws a window of a box of voxels of a volume that is streamed.
-    fn draw_box(&self, volume: Volume, scene: &Scene, window: &Window) -> Result<(Content, Stats), RenderError> {
+    /// Draws a window of a box of voxels of a volume that is streamed. Of pixels that are closed, row by row, no more need be drawn.
+    fn draw_box(
+        &self,
+        volume: Volume,
+        scene: &Scene,
+        window: &Window,
+        closed: Option<&[bool]>,
+    ) -> Result<(Content, Stats), RenderError> {
         match &self.drawer {
             #[cfg(feature = "gpu")]
-            Drawer::Gpu(gpu) => gpu.draw_content(&mut gpu.view(volume, scene)?, window),
+            Drawer::Gpu(gpu) => gpu.draw_box(volume, scene, window, closed),
             #[cfg(feature = "cpu")]
-            Drawer::Cpu => CpuRenderer::new(volume, scene)?.draw_content(window),
+            Drawer::Cpu => CpuRenderer::new(volume, scene)?.draw_box(window, closed),
             Drawer::Reference => {
                 let (content, _, stats) = ReferenceView::new(volume, scene)?.draw_content(window)?;
                 Ok((content, stats))

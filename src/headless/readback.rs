@@ -1,5 +1,7 @@
 //! Blocking readback of buffers and textures.
 
+use std::ops::Range;
+
 use wgpu::{Buffer, BufferUsages, Device, Queue, Texture};
 
 use crate::error::RenderError;
@@ -9,12 +11,21 @@ use crate::error::RenderError;
 /// # Errors
 /// If the device is lost.
 pub fn buffer(device: &Device, queue: &Queue, source: &Buffer) -> Result<Vec<u8>, RenderError> {
-    let staging = staging(device, source.size());
+    buffer_part(device, queue, source, 0..source.size())
+}
+
+/// The bytes of a range of them, whose ends are multiples of four.
+///
+/// # Errors
+/// If the device is lost.
+pub fn buffer_part(device: &Device, queue: &Queue, source: &Buffer, range: Range<u64>) -> Result<Vec<u8>, RenderError> {
+    let size = range.end - range.start;
+    let staging = staging(device, size);
     let mut encoder =
         device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("sheetsplat.readback") });
-    encoder.copy_buffer_to_buffer(source, 0, &staging, 0, source.size());
+    encoder.copy_buffer_to_buffer(source, range.start, &staging, 0, size);
     queue.submit([encoder.finish()]);
-    let mut bytes = Vec::with_capacity(source.size() as usize);
+    let mut bytes = Vec::with_capacity(size as usize);
     read(device, &staging, |mapped| bytes.extend_from_slice(mapped))?;
     Ok(bytes)
 }

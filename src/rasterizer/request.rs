@@ -10,9 +10,10 @@ use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::geometry::means;
 use crate::geometry::plane_geometry::PlaneGeometry;
-use crate::geometry::surfaces::{SurfaceDepths, Surfaces};
+use crate::geometry::surfaces::SurfaceDepths;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::classified_volume::{ClassifiedVolume, Layer};
+use crate::gpu::hiding::Hiding;
 use crate::gpu::layout::{Band, FieldPlanes};
 use crate::gpu::ramps::{Integration, Ramps, Stored};
 use crate::gpu::shown_bricks::BrickNeeds;
@@ -47,7 +48,7 @@ pub(crate) struct FrameRequest {
     pub(crate) window: Window,
     /// The opacity of first hits.
     pub(crate) first_hit: Option<f64>,
-    /// A host's surfaces, and the texel of the image's first pixel.
+    /// What ends rays, and the texel of the image's first pixel.
     pub(crate) surfaces: Option<(SurfaceDepths, [u32; 2])>,
     pub(crate) kind: RasterizerKind,
     /// Why the device does not draw by tiles.
@@ -110,7 +111,7 @@ impl FrameRequest {
         device: &Device,
         (volume, layer, joining): (&ClassifiedVolume, &Layer, Option<Joining>),
         (scene, camera): (&Scene, &Camera),
-        (surfaces, first_hit, window): (Option<&Surfaces>, Option<f64>, Option<&Window>),
+        (hiding, first_hit, window): (Option<&Hiding>, Option<f64>, Option<&Window>),
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
         let splatting = scene.splatting;
@@ -122,7 +123,7 @@ impl FrameRequest {
         let of_pixel = |stored: &[Stored]| records(stored) + sheet_records(stored);
         let records = if is_after { of_pixel(&volume.gpu_volume().stored()) } else { 1 };
         let bands = CompositingBuffer::bands_for(&device.limits(), size, records)?;
-        let is_cut = surfaces.is_some() || !scene.clip.is_empty() || window.is_some();
+        let is_cut = hiding.is_some() || !scene.clip.is_empty() || window.is_some();
         let rays = RayMode { cut: is_cut, first_hit: first_hit.is_some() };
         let drawn = window.map_or_else(|| Window::whole(size), |window| window.opened(&seen.slabs_of(grid)));
         splatting.check_rays(rays.cut, first_hit)?;
@@ -130,10 +131,7 @@ impl FrameRequest {
         let first_hit = first_hit.or((joining == Some(Joining::Nearest)).then_some(1.0));
         let rays = RayMode { first_hit: first_hit.is_some(), ..rays };
         check_hits(device, rays, size)?;
-        let surfaces = match surfaces {
-            Some(surfaces) => Some((surfaces.depths(&seen, grid)?, surfaces.origin)),
-            None => None,
-        };
+        let surfaces = hiding.map(|hiding| hiding.depths(&seen, grid)).transpose()?;
         let (kind, fallback) = RasterizerKind::of(device, &splatting, &stored, rasterizer)?;
         let after = is_after.then(|| After::new((volume, layer), scene, &seen)).transpose()?;
         let integration = after.as_ref().map(|after| Integration {

@@ -35,10 +35,10 @@ impl Renderer {
         layers: &[Layer],
         joining: Option<Joining>,
     ) -> Result<Vec<FrameRequest>, RenderError> {
-        let SceneView { volume, scene, surfaces, first_hit, window, .. } = view;
+        let SceneView { volume, scene, hiding, first_hit, window, .. } = view;
         let camera = view.camera();
         let request = |layer| {
-            let host = (surfaces.as_ref(), *first_hit, window.as_ref());
+            let host = (hiding.as_ref(), *first_hit, window.as_ref());
             FrameRequest::new(&self.device, (volume, layer, joining), (scene, &camera), host, self.rasterizer)
         };
         layers.iter().map(request).collect()
@@ -54,7 +54,7 @@ impl Renderer {
         // Everything that can fail comes before anything is taken from the last frame.
         let (layers, joining) = view.volume.layers();
         let mut requests = self.requests(view, &layers, joining)?;
-        let SceneView { volume, scene, surfaces, first_hit, frame, .. } = view;
+        let SceneView { volume, scene, hiding, first_hit, frame, .. } = view;
         let mut fallback = requests.iter_mut().find_map(|request| request.fallback.take());
         if let Some(needs) = needs_of(&requests[0]) {
             volume.show(needs);
@@ -71,8 +71,8 @@ impl Renderer {
         let cut = write(kept.cut, &cut_uniform(), bytemuck::bytes_of(&cut_values))?;
         let cut_buffers = CutBuffers {
             uniform: &cut,
-            surfaces: match surfaces {
-                Some(surfaces) => &surfaces.depth,
+            surfaces: match hiding {
+                Some(hiding) => hiding.depth(),
                 None => self.no_surfaces.get_or_init(|| no_surfaces(device)),
             },
         };

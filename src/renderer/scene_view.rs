@@ -11,6 +11,7 @@ use crate::gpu::classified_volume::{ClassifiedVolume, Touched};
 use crate::gpu::counts::PendingCounts;
 use crate::gpu::fault::scoped;
 use crate::gpu::gpu_volume::GpuVolume;
+use crate::gpu::hiding::Hiding;
 pub use crate::rasterizer::Prepared;
 use crate::renderer::pick::PendingPick;
 use crate::renderer::prepared_frame::{Drawing, PreparedFrame, PreparedLayer};
@@ -30,7 +31,7 @@ use crate::settings::window::Window;
 pub struct SceneView {
     pub(crate) volume: ClassifiedVolume,
     pub(crate) scene: Scene,
-    pub(crate) surfaces: Option<Surfaces>,
+    pub(crate) hiding: Option<Hiding>,
     pub(crate) first_hit: Option<f64>,
     /// What is drawn, if that is a part of the image (SPEC §11).
     pub(crate) window: Option<Window>,
@@ -55,7 +56,7 @@ impl SceneView {
         let scene = scene.classified(volume.volume());
         let splatting = &scene.splatting;
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, splatting))?;
-        Ok(Self { volume, scene, surfaces: None, first_hit: None, window: None, frame: None, extent: OnceLock::new() })
+        Ok(Self { volume, scene, hiding: None, first_hit: None, window: None, frame: None, extent: OnceLock::new() })
     }
 
     /// The settings. Its `volume` and `transfer` are those with which the view was made.
@@ -169,7 +170,7 @@ impl SceneView {
     /// If [`Surfaces::check`] refuses them; then nothing changes.
     pub fn set_surfaces(&mut self, surfaces: Option<Surfaces>) -> Result<(), SettingError> {
         surfaces.as_ref().map_or(Ok(()), Surfaces::check)?;
-        self.surfaces = surfaces;
+        self.hiding = surfaces.map(Hiding::Surfaces);
         Ok(())
     }
 

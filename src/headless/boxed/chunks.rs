@@ -63,21 +63,9 @@ impl<'a> Chunks<'a> {
         Ok(Self { volume, view: *view, half_box: geometry.widest_half_box(view), channels, most_held: 0 })
     }
 
-    /// The steps in which the slabs behind a region are drawn, front to back, each of as many slabs as fit into memory with the voxels that they need; `None` if
-    /// those of some slab do not fit.
-    pub(super) fn steps(&self, region: &Region, slabs: &Range<i32>) -> Option<Vec<Step>> {
-        let mut steps = Vec::new();
-        let mut start = slabs.start;
-        while start < slabs.end {
-            let step = self.deepest(region, start..slabs.end)?;
-            start = step.0.end;
-            steps.push(step);
-        }
-        Some(steps)
-    }
-
-    /// The first step of those of some slabs.
-    fn deepest(&self, region: &Region, slabs: Range<i32>) -> Option<Step> {
+    /// The first step in which slabs behind a region are drawn front to back: as many as fit into memory with the voxels that they need; `None` if those of
+    /// the first slab do not fit.
+    pub(super) fn deepest(&self, region: &Region, slabs: Range<i32>) -> Option<Step> {
         let mut best = None;
         let mut depth = 1;
         loop {

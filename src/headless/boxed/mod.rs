@@ -19,7 +19,7 @@ use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
 use crate::scene::names::{COMPOSITINGS, name_of};
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Compositing, Order};
+use crate::settings::splatting::{Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
 use crate::volume::range::range_of;
@@ -140,39 +140,69 @@ struct Walk<'a> {
 }
 
 impl Walk<'_> {
-    /// Draws a region, or where the voxels behind it fit into no memory, its quarters.
+    /// Draws a region.
     fn region(&mut self, region: Region) -> Result<(), RenderError> {
-        let Some(steps) = self.chunks.steps(&region, &self.slabs) else {
-            let side = region.width.max(region.height).div_ceil(2);
-            if side < LEAST_SIDE {
-                return Err(self.chunks.too_large().into());
-            }
-            return tiles(&region, side).into_iter().try_for_each(|region| self.region(region));
-        };
-        let mut drawn = self.empty(&Window { slabs: self.slabs.start..self.slabs.start, region });
-        for (slabs, needed) in steps {
-            if self.is_opaque(&drawn.content) {
-                break;
-            }
-            let window = Window { slabs, region };
-            let next = match needed.map_or(Ok(None), |needed| self.chunks.read(needed))? {
-                Some(filled) => self.part(filled, &window)?,
-                None => self.empty(&window),
-            };
-            drawn = Part::join([drawn, next]).map_err(unmerged)?;
-        }
+        let nothing = Content::empty(region.pixels(), self.identity.has_extremes());
         // What opaque pixels hide counts as drawn.
-        drawn.window.slabs = self.slabs.clone();
-        self.parts.push(drawn);
+        let (slabs, content) = (self.slabs.clone(), self.behind(region, self.slabs.clone(), nothing)?);
+        self.parts.push(Part::named(self.identity.clone(), Window { slabs, region }, vec![content]));
         Ok(())
     }
 
+    /// Draws slabs behind what a region shows already, as many at a time as fit into memory with the voxels that the region's open pixels need. Where those of
+    /// a single slab do not fit, the quarters of the region are drawn.
+    fn behind(&mut self, region: Region, mut slabs: Range<i32>, mut drawn: Content) -> Result<Content, RenderError> {
+        while slabs.start < slabs.end {
+            let Some(open) = self.open_box(&drawn, &region) else { break };
+            let Some((step, needed)) = self.chunks.deepest(&open, slabs.clone()) else {
+                let longer = open.width.max(open.height);
+                if longer <= LEAST_SIDE {
+                    return Err(self.chunks.too_large().into());
+                }
+                let side = longer.div_ceil(2).max(LEAST_SIDE);
+                for quarter in tiles(&open, side) {
+                    let behind = self.behind(quarter, slabs.clone(), cut_out(&drawn, &region, &quarter))?;
+                    put((&behind, &quarter), (&mut drawn, &region));
+                }
+                break;
+            };
+            let filled = needed.map_or(Ok(None), |needed| self.chunks.read(needed))?;
+            slabs.start = step.end;
+            if let Some(filled) = filled {
+                let front = cut_out(&drawn, &region, &open);
+                let window = Window { slabs: step, region: open };
+                let joined = self.join(front, filled, window)?;
+                put((&joined, &open), (&mut drawn, &region));
+            }
+        }
+        Ok(drawn)
+    }
+
+    /// Draws a window from the voxels that it needs, behind what its region shows already.
+    fn join(&mut self, front: Content, filled: Filled, window: Window) -> Result<Content, RenderError> {
+        let closed: Option<Vec<bool>> =
+            self.opaque().map(|opaque| front.colors.iter().map(|color| color[3] >= opaque).collect());
+        let closed = closed.filter(|closed| closed.contains(&true));
+        let content = self.draw(filled, &window, closed.as_deref())?;
+        let part =
+            |slabs, content| Part::named(self.identity.clone(), Window { slabs, ..window.clone() }, vec![content]);
+        let start = window.slabs.start;
+        let joined = Part::join([part(start - 1..start, front), part(window.slabs.clone(), content)]);
+        Ok(joined.map_err(unmerged)?.content)
+    }
+
     /// Draws a window from the voxels that it needs. A channel of which nothing is seen changes nothing, so that its table is left out.
-    fn part(&mut self, (volume, channels): Filled, window: &Window) -> Result<Part, RenderError> {
+    fn draw(
+        &mut self,
+        (volume, channels): Filled,
+        window: &Window,
+        closed: Option<&[bool]>,
+    ) -> Result<Content, RenderError> {
         // Means are noted as they are.
         let is_choice = self.identity.has_extremes() && self.scene.splatting.compositing != Compositing::Average;
         let range = if is_choice { range_of(volume.values().iter()) } else { None };
-        let (mut content, stats) = self.headless.draw_box(volume, &self.scene.of_channels(&channels), window)?;
+        let scene = self.scene.of_channels(&channels);
+        let (mut content, stats) = self.headless.draw_box(volume, &scene, window, closed)?;
         if let Some(range) = range {
             in_range(&mut content.extremes, range, self.range);
         }
@@ -180,26 +210,29 @@ impl Walk<'_> {
         self.stats = Stats { prepare_ms: prepare_ms + stats.prepare_ms, ..stats };
         let own = std::mem::replace(&mut self.stats.counts, counts);
         self.stats.counts.add_channel(&own);
-        Ok(Part::named(self.identity.clone(), window.clone(), vec![content]))
+        Ok(content)
     }
 
-    /// A window that shows nothing.
-    fn empty(&self, window: &Window) -> Part {
-        let content = Content::empty(window.region.pixels(), self.identity.has_extremes());
-        Part::named(self.identity.clone(), window.clone(), vec![content])
+    /// The opacity from which nothing behind a pixel can be seen, if there is one.
+    fn opaque(&self) -> Option<f32> {
+        let Splatting { compositing, culling, order, opacity_threshold, .. } = self.scene.splatting;
+        let enough = if compositing == Compositing::Surface { 1.0 } else { opacity_threshold as f32 };
+        (compositing.hides() && culling && order == Order::FrontToBack).then_some(enough)
     }
 
-    /// Whether nothing behind what is drawn can be seen.
-    fn is_opaque(&self, content: &Content) -> bool {
-        let splatting = &self.scene.splatting;
-        let enough = match splatting.compositing {
-            Compositing::Surface => 1.0,
-            _ => splatting.opacity_threshold as f32,
-        };
-        splatting.compositing.hides()
-            && splatting.culling
-            && splatting.order == Order::FrontToBack
-            && content.colors.iter().all(|color| color[3] >= enough)
+    /// The smallest box of a region's pixels behind which anything can be seen; `None` if there is no such pixel.
+    fn open_box(&self, content: &Content, region: &Region) -> Option<Region> {
+        let Some(opaque) = self.opaque() else { return Some(*region) };
+        let (mut low, mut high) = ([u32::MAX; 2], [0; 2]);
+        for (color, at) in content.colors.iter().zip(0..).filter(|(color, _)| color[3] < opaque) {
+            debug_assert!(color[3].is_finite());
+            let place: [u32; 2] = [at % region.width, at / region.width];
+            for axis in 0..2 {
+                (low[axis], high[axis]) = (low[axis].min(place[axis]), high[axis].max(place[axis]));
+            }
+        }
+        let [width, height] = [0, 1].map(|axis| (high[axis] + 1).saturating_sub(low[axis]));
+        (width > 0).then(|| Region { x: region.x + low[0], y: region.y + low[1], width, height })
     }
 }
 
@@ -255,16 +288,30 @@ fn side_by_side(parts: Vec<Part>, window: &Window) -> Result<Part, RenderError> 
     let mut content = Content::default();
     let mut identity = None;
     for part in parts {
-        let own = part.window.region;
         if identity.is_none() {
             content = Content::empty(region.pixels(), part.identity.has_extremes());
         }
-        copy((&part.content.colors, &own), (&mut content.colors, region));
-        copy((&part.content.extremes, &own), (&mut content.extremes, region));
+        put((&part.content, &part.window.region), (&mut content, region));
         identity = Some(part.identity);
     }
     let identity = identity.ok_or_else(|| RenderError::Readback("a window has no region".to_owned()))?;
     Ok(Part::named(identity, window.clone(), vec![content]))
+}
+
+/// The pixels of a region within another one.
+fn cut_out(content: &Content, region: &Region, own: &Region) -> Content {
+    fn part<T: Copy>(pixels: &[T], region: &Region, own: &Region) -> Vec<T> {
+        let rows = pixels.chunks_exact(region.width as usize).skip((own.y - region.y) as usize);
+        let first = (own.x - region.x) as usize;
+        rows.take(own.height as usize).flat_map(|row| &row[first..first + own.width as usize]).copied().collect()
+    }
+    Content { colors: part(&content.colors, region, own), extremes: part(&content.extremes, region, own) }
+}
+
+/// Puts the pixels of a region where they are in one around it.
+fn put((from, own): (&Content, &Region), (to, region): (&mut Content, &Region)) {
+    copy((&from.colors, own), (&mut to.colors, region));
+    copy((&from.extremes, own), (&mut to.extremes, region));
 }
 
 /// Copies the pixels of a region, row by row, to where they are in one around it; pixels may carry nothing.
