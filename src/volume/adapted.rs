@@ -116,6 +116,10 @@ impl Store for AdaptedStore {
         self.store.fill()
     }
 
+    fn decodes_whole_chunks(&self) -> bool {
+        self.store.decodes_whole_chunks()
+    }
+
     fn memory(&self, level: usize) -> u64 {
         self.store.memory(level)
     }

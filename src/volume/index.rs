@@ -259,6 +259,10 @@ impl Store for IndexedStore {
         self.store.fill()
     }
 
+    fn decodes_whole_chunks(&self) -> bool {
+        self.store.decodes_whole_chunks()
+    }
+
     fn memory(&self, level: usize) -> u64 {
         self.store.memory(level)
     }

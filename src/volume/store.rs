@@ -39,6 +39,11 @@ pub trait Store: Send + Sync + Debug {
     /// The value of every voxel in a chunk that the store does not hold.
     fn fill(&self) -> f32;
 
+    /// Whether reading a part of a chunk takes as long as reading all of it, so that it is better kept than read again.
+    fn decodes_whole_chunks(&self) -> bool {
+        false
+    }
+
     /// The maximum number of bytes that reading all values of a level into a [`Volume`](super::Volume) takes; a level that the store lacks takes 0. A volume
     /// for which more than the memory limit is needed is streamed.
     fn memory(&self, level: usize) -> u64 {

@@ -1,6 +1,7 @@
 //! A volume in memory that is read by boxes.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use glam::UVec3;
@@ -19,6 +20,9 @@ pub(crate) struct MemoryStore {
     pub(crate) is_range_known: bool,
     /// What identifies it.
     pub(crate) identity: &'static str,
+    /// The number of boxes that were read; only whole chunks may be, if it decodes them.
+    pub(crate) reads: AtomicU64,
+    pub(crate) decodes_whole_chunks: bool,
 }
 
 impl MemoryStore {
@@ -31,6 +35,8 @@ impl MemoryStore {
             broken_from: None,
             is_range_known: true,
             identity: "memory",
+            reads: AtomicU64::new(0),
+            decodes_whole_chunks: false,
         }
     }
 
@@ -51,6 +57,10 @@ impl Store for MemoryStore {
             let source = std::io::Error::other("the disk is gone");
             return Err(VolumeError::io("store", source));
         }
+        let side = self.levels[0].chunk;
+        let is_chunk = from % side == UVec3::ZERO && from + dims == (from + side).min(self.volume.dims());
+        assert!(is_chunk || !self.decodes_whole_chunks, "{from} {dims}");
+        self.reads.fetch_add(1, Ordering::Relaxed);
         self.read.lock().unwrap().insert(from.to_array());
         let voxels = (0..dims.z).flat_map(|z| (0..dims.y).flat_map(move |y| (0..dims.x).map(move |x| [x, y, z])));
         for (value, at) in values.iter_mut().zip(voxels) {
@@ -71,6 +81,10 @@ impl Store for MemoryStore {
 
     fn fill(&self) -> f32 {
         0.0
+    }
+
+    fn decodes_whole_chunks(&self) -> bool {
+        self.decodes_whole_chunks
     }
 
     fn range(&self, _: usize) -> Option<[f32; 2]> {

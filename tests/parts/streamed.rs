@@ -2,6 +2,7 @@
 
 use std::collections::HashSet;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::Image;
@@ -105,6 +106,30 @@ fn boxes_by_the_gpu_are_the_volume_in_memory() {
     for sets in [&[0, 1, 3, 6][..], &[8, 9, 10, 11, 12, 13]].concat().into_iter().map(|at: usize| SCENES[at]) {
         assert_same(Backend::Gpu, 64, sets);
     }
+}
+
+/// Where a part of a chunk takes as long to read as all of it, chunks are read once as long as they fit into memory.
+#[test]
+fn decoded_chunks_are_kept() {
+    let (head, scene) = head(64, &["splatting.classification=after"]);
+    let values = head.values().iter().map(|value| value * 1.001).collect();
+    let volume = Volume::new("head", head.dims(), head.spacing(), values).unwrap();
+    let headless = headless(Backend::Reference);
+    // The chunks that are needed take about 220 KiB, and boxes as much as chunks may.
+    let draw = |memory: u64, decodes_whole_chunks: bool| {
+        let store = Arc::new(MemoryStore { decodes_whole_chunks, ..MemoryStore::new(&volume, UVec3::new(8, 12, 10)) });
+        let drawn = headless.render_volume(store::streamed(store.clone(), 0, &volume, memory), &scene).unwrap();
+        let counts = drawn.stats.store.unwrap();
+        assert!(counts.chunk_bytes <= memory / 2, "{counts:?}");
+        (drawn.image, counts, store.reads.load(Ordering::Relaxed))
+    };
+    let (image, counts, reads) = draw(1 << 20, false);
+    assert!(reads > 3 * counts.chunks_read, "{reads} {counts:?}");
+    let (kept, counts, reads) = draw(1 << 20, true);
+    assert!(kept == image && reads == counts.chunks_read, "{reads} {counts:?}");
+    let (few, counts, reads) = draw(3 << 18, true);
+    assert!(reads > counts.chunks_read, "{reads} {counts:?}");
+    assert_at_least(psnr(&few.pixels, &image.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, "in less memory");
 }
 
 /// Holes are no neighbours for gradients, in boxes neither.

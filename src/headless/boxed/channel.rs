@@ -1,9 +1,11 @@
 //! The chunks of one channel of a volume that is streamed: of its values and of its labels.
 
 use std::collections::{BTreeMap, HashSet};
+use std::sync::Arc;
 
 use glam::UVec3;
 
+use super::kept::Kept;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::lists::iso_range::ValueSet;
@@ -11,7 +13,7 @@ use crate::parallel::prelude::*;
 use crate::settings::splatting::{Classification, Compositing, Splatting};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::range::{EMPTY, union};
-use crate::volume::{Grid, Labels, StoreLevel, StreamedChannel, StreamedLevel, Volume, VolumeError, labels_of};
+use crate::volume::{Grid, Labels, StoreLevel, StreamedChannel, StreamedLevel, Values, Volume, VolumeError, labels_of};
 
 /// The maximum number of chunks of a level.
 const MOST_CHUNKS: u64 = 1 << 24;
@@ -47,7 +49,8 @@ pub(super) struct ChannelChunks<'a> {
 }
 
 impl<'a> ChannelChunks<'a> {
-    /// A channel, given by its number, under its transfer function. Values bear on points at most `reach` voxels away.
+    /// A channel, given by its number, under its transfer function. Values bear on points at most `reach` voxels away. Decoded chunks of values, and those of
+    /// labels, may take `kept` bytes.
     ///
     /// # Errors
     /// If the chunks are too many.
@@ -55,10 +58,10 @@ impl<'a> ChannelChunks<'a> {
         (number, channel): (usize, &'a StreamedChannel),
         transfer: &TransferFunction,
         splatting: &Splatting,
-        reach: UVec3,
+        (reach, kept): (UVec3, u64),
     ) -> Result<Self, SettingError> {
-        let values = LevelChunks::new(&channel.values)?;
-        let labels = channel.labels.as_ref().map(LevelChunks::new).transpose()?;
+        let values = LevelChunks::new(&channel.values, kept)?;
+        let labels = channel.labels.as_ref().map(|labels| LevelChunks::new(labels, kept)).transpose()?;
         let opaque = opaque_values(transfer);
         let is_told_by_chunks = reach.cmple(values.level.chunk).all();
         let is_between = splatting.classification == Classification::After;
@@ -153,6 +156,8 @@ pub(super) struct LevelChunks<'a> {
     level: StoreLevel,
     read: HashSet<UVec3>,
     bytes_read: u64,
+    /// Chunks of a store that decodes them as a whole.
+    kept: Kept,
 }
 
 /// What was read of a chunk for a box: the first voxel and the voxels along each axis, their values, and the bytes of the store; no bytes if the store does not hold
@@ -166,7 +171,7 @@ struct Piece {
 }
 
 impl<'a> LevelChunks<'a> {
-    fn new(of: &'a StreamedLevel) -> Result<Self, SettingError> {
+    fn new(of: &'a StreamedLevel, kept: u64) -> Result<Self, SettingError> {
         let level = of.store.levels()[of.level];
         let count = if level.chunk.min_element() == 0 { 0 } else { level.chunks().as_u64vec3().element_product() };
         if !(1..=MOST_CHUNKS).contains(&count) {
@@ -174,7 +179,7 @@ impl<'a> LevelChunks<'a> {
             let allowed = format!("at most {MOST_CHUNKS} chunks of at least 1 voxel");
             return Err(SettingError::new("volume", found, allowed));
         }
-        Ok(Self { of, level, read: HashSet::new(), bytes_read: 0 })
+        Ok(Self { of, level, read: HashSet::new(), bytes_read: 0, kept: Kept::new(kept) })
     }
 
     /// The number of chunks of which something was read.
@@ -185,6 +190,11 @@ impl<'a> LevelChunks<'a> {
     /// Their bytes in the store, each chunk's once.
     pub(super) fn bytes_read(&self) -> u64 {
         self.bytes_read
+    }
+
+    /// The most bytes that decoded chunks took at a time.
+    pub(super) fn most_kept(&self) -> u64 {
+        self.kept.most_held()
     }
 
     /// The chunks that share voxels with a box.
@@ -218,9 +228,33 @@ impl<'a> LevelChunks<'a> {
         let low = within.low.max(chunk * side);
         let dims = within.end.min((chunk + 1) * side) - low;
         let mut values = vec![store.fill(); dims.element_product() as usize];
-        let is_held = store.contains(*level, chunk)?;
-        let bytes = is_held.then(|| store.read(*level, low, dims, &mut values)).transpose()?;
-        Ok(Piece { chunk, low, dims, values, bytes })
+        if !store.contains(*level, chunk)? {
+            return Ok(Piece { chunk, low, dims, values, bytes: None });
+        }
+        if !store.decodes_whole_chunks() {
+            let bytes = Some(store.read(*level, low, dims, &mut values)?);
+            return Ok(Piece { chunk, low, dims, values, bytes });
+        }
+        let first = chunk * side;
+        let whole = self.level.grid.part(first, self.level.grid.dims.min(first + side) - first);
+        let (decoded, bytes) = match self.kept.get(chunk) {
+            // Its bytes have been counted.
+            Some(decoded) => (decoded, 0),
+            None => {
+                let mut decoded = vec![store.fill(); whole.dims.element_product() as usize];
+                let bytes = store.read(*level, first, whole.dims, &mut decoded)?;
+                let decoded = Arc::new(Values::from(decoded).narrowed());
+                self.kept.keep(chunk, &decoded);
+                (decoded, bytes)
+            }
+        };
+        for (row, number) in values.chunks_exact_mut(dims.x as usize).zip(0..) {
+            let from = low - first + UVec3::new(0, number % dims.y, number / dims.y);
+            let at = whole.index_of(from) as usize;
+            let own = decoded.as_slice().slice(at..at + row.len());
+            row.iter_mut().zip(own.iter()).for_each(|(to, value)| *to = value);
+        }
+        Ok(Piece { chunk, low, dims, values, bytes: Some(bytes) })
     }
 }
 

@@ -15,7 +15,7 @@ use crate::settings::window::Region;
 use crate::stats::StoreCounts;
 use crate::volume::{StreamedVolume, Volume};
 
-/// The part of the chunks' memory that the values of a box may take: backends hold them several times.
+/// The part of the memory that the values of a box may take, as backends hold them several times, and that decoded chunks may take.
 const SHARE: u64 = 4;
 
 /// Slabs around those of a window, which share planes with them.
@@ -54,9 +54,11 @@ impl<'a> Chunks<'a> {
         let geometry = PlaneGeometry::new(view, volume.grid());
         let reach = if is_after { geometry.reach(view) } else { UVec3::ZERO };
         let transfer = scene.resolve(&volume.sample);
+        let stores = volume.channels().map(|channel| 1 + u64::from(channel.labels.is_some())).sum::<u64>();
+        let kept = volume.memory / SHARE / stores;
         let channels = volume.channels().zip(transfer.channels()).enumerate();
         let channels = channels.map(|(number, (channel, transfer))| {
-            ChannelChunks::new((number, channel), transfer, &scene.splatting, reach)
+            ChannelChunks::new((number, channel), transfer, &scene.splatting, (reach, kept))
         });
         let channels = channels.collect::<Result<Vec<_>, _>>()?;
         let channels = channels.into_iter().filter(ChannelChunks::has_opacity).collect();
@@ -139,7 +141,7 @@ impl<'a> Chunks<'a> {
             chunks_total: self.volume.chunks(),
             chunks_read: levels().map(LevelChunks::chunks_read).sum(),
             bytes_read: levels().map(LevelChunks::bytes_read).sum(),
-            chunk_bytes: self.most_held,
+            chunk_bytes: self.most_held + levels().map(LevelChunks::most_kept).sum::<u64>(),
             ..StoreCounts::default()
         }
     }

@@ -3,6 +3,7 @@
 
 mod channel;
 mod chunks;
+mod kept;
 
 use std::ops::Range;
 
@@ -180,8 +181,8 @@ impl Walk<'_> {
 
     /// Draws a window from the voxels that it needs, behind what its region shows already.
     fn join(&mut self, front: Content, filled: Filled, window: Window) -> Result<Content, RenderError> {
-        let closed: Option<Vec<bool>> =
-            self.opaque().map(|opaque| front.colors.iter().map(|color| color[3] >= opaque).collect());
+        let closed: Option<Vec<bool>> = opaque_from(&self.scene.splatting)
+            .map(|opaque| front.colors.iter().map(|color| color[3] >= opaque).collect());
         let closed = closed.filter(|closed| closed.contains(&true));
         let content = self.draw(filled, &window, closed.as_deref())?;
         let part =
@@ -213,16 +214,9 @@ impl Walk<'_> {
         Ok(content)
     }
 
-    /// The opacity from which nothing behind a pixel can be seen, if there is one.
-    fn opaque(&self) -> Option<f32> {
-        let Splatting { compositing, culling, order, opacity_threshold, .. } = self.scene.splatting;
-        let enough = if compositing == Compositing::Surface { 1.0 } else { opacity_threshold as f32 };
-        (compositing.hides() && culling && order == Order::FrontToBack).then_some(enough)
-    }
-
     /// The smallest box of a region's pixels behind which anything can be seen; `None` if there is no such pixel.
     fn open_box(&self, content: &Content, region: &Region) -> Option<Region> {
-        let Some(opaque) = self.opaque() else { return Some(*region) };
+        let Some(opaque) = opaque_from(&self.scene.splatting) else { return Some(*region) };
         let (mut low, mut high) = ([u32::MAX; 2], [0; 2]);
         for (color, at) in content.colors.iter().zip(0..).filter(|(color, _)| color[3] < opaque) {
             debug_assert!(color[3].is_finite());
@@ -234,6 +228,13 @@ impl Walk<'_> {
         let [width, height] = [0, 1].map(|axis| (high[axis] + 1).saturating_sub(low[axis]));
         (width > 0).then(|| Region { x: region.x + low[0], y: region.y + low[1], width, height })
     }
+}
+
+/// The opacity from which nothing behind a pixel can be seen, if there is one.
+fn opaque_from(splatting: &Splatting) -> Option<f32> {
+    let Splatting { compositing, culling, order, opacity_threshold, .. } = *splatting;
+    let enough = if compositing == Compositing::Surface { 1.0 } else { opacity_threshold as f32 };
+    (compositing.hides() && culling && order == Order::FrontToBack).then_some(enough)
 }
 
 /// Converts values that pixels chose, places in the range of a box's values, into places in the range of all.

@@ -175,6 +175,10 @@ impl Store for ZarrStore {
         self.image.levels[0].array.fill()
     }
 
+    fn decodes_whole_chunks(&self) -> bool {
+        true
+    }
+
     fn memory(&self, level: usize) -> u64 {
         let Some(Level { array, .. }) = self.image.levels.get(level) else { return 0 };
         array.memory::<f32>(1).saturating_add(array.chunk_memory::<f32>(parallel::current_num_threads()))
