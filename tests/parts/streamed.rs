@@ -1,6 +1,6 @@
 //! Volumes that are read box by box while a backend draws windows of them: the image of the volume in memory, to rounding.
 
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -11,7 +11,7 @@ use sheetsplat::part::Part;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Region, Window};
 use sheetsplat::stats::StoreCounts;
-use sheetsplat::volume::{IndexedStore, Store, StoreIndex, StreamedVolume, Volume, builtin};
+use sheetsplat::volume::{IndexedStore, Labels, Store, StoreIndex, StreamedLevel, StreamedVolume, Volume, builtin};
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
@@ -88,6 +88,8 @@ const SCENES: [&[&str]; 14] = [
 /// What is dense is opaque, so that surfaces before splatting show it.
 const OPAQUE: &str = "transfer.opacity=[[0,0],[40,0.02],[60,0.9]]";
 
+const THIN_AROUND_OPAQUE: &str = "transfer.opacity=[[60,0.001],[61,0],[199,0],[200,1]]";
+
 /// A box in the head, with little air.
 const INSIDE: &str = "clip.crop=[[-40,-45,-30],[45,40,35]]";
 
@@ -130,6 +132,35 @@ fn decoded_chunks_are_kept() {
     let (few, counts, reads) = draw(3 << 18, true);
     assert!(reads > counts.chunks_read, "{reads} {counts:?}");
     assert_at_least(psnr(&few.pixels, &image.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, "in less memory");
+}
+
+/// Behind the opaque middle of a wall nothing of the haze is drawn, although the box of the open pixels around it contains it.
+#[test]
+fn what_boxes_in_front_hide_is_not_drawn() {
+    let dims = UVec3::new(64, 36, 36);
+    let is_wall = |at: [u32; 3]| at[0] < 6 && (4..32).contains(&at[1]) && (4..32).contains(&at[2]);
+    let at = |index: u32| [index % 64, index / 64 % 36, index / (64 * 36)];
+    let values = (0..dims.element_product()).map(|index| if is_wall(at(index)) { 200.0 } else { 60.0 }).collect();
+    let volume = Volume::new("wall", dims, DVec3::ONE, values).unwrap();
+    let labels = Volume::new("labels", dims, DVec3::ONE, vec![1.0; volume.values().len()]).unwrap();
+    let (origin, values) = ("labels".to_owned(), vec![1; volume.values().len()].into());
+    let labelled = Labels { origin, dims, spacing: None, values, names: BTreeMap::new() };
+    let labelled = volume.clone().with_labels(labelled).unwrap();
+    let sets = ["camera={direction=[1,0.01,0.02],height=40}", "splatting.opacity_threshold=0.95", THIN_AROUND_OPAQUE];
+    let (_, mut scene) = head(8, &sets);
+    for (backend, has_labels) in [(Backend::Cpu, true), (Backend::Gpu, false)] {
+        let [hidden, all] = [true, false].map(|culling| {
+            scene.splatting.culling = culling;
+            let sample = if has_labels { &labelled } else { &volume };
+            let mut streamed = streamed(sample, MemoryStore::new(&volume, UVec3::splat(12)), 1 << 20);
+            let labels = || StreamedLevel::new("labels", Arc::new(MemoryStore::new(&labels, UVec3::splat(12))), 0);
+            streamed.first.labels = has_labels.then(labels);
+            headless(backend).render_volume(streamed, &scene).unwrap()
+        });
+        let [fewer, sections] = [&hidden, &all].map(|drawn| drawn.stats.counts.sections_rasterized);
+        assert!(sections > 100_000 && fewer * 10 < sections * 6, "{backend}: {fewer} {sections}");
+        assert_at_least(psnr(&hidden.image.pixels, &all.image.pixels, [0.2, 0.4, 0.6, 0.5], 500), 40.0, backend);
+    }
 }
 
 /// Holes are no neighbours for gradients, in boxes neither.

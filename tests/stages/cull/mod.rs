@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{DVec3, UVec3};
 use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::after::normalization::Normalization;
-use sheetsplat::internals::brick::{self, BRICK_VOXELS};
+use sheetsplat::internals::brick::{self, BRICK_VOXELS, BrickList};
 use sheetsplat::internals::gpu::brick_lists::BrickLists;
 use sheetsplat::internals::gpu::layout::{self, Brick, BrickState, FieldVoxel, Frame, Indirect, SheetGroup, Tally};
 use sheetsplat::internals::gpu::ramps::Ramps;
