@@ -185,6 +185,10 @@ impl Headless {
     }
 
     /// Draws a window of a box of voxels of a volume that is streamed. Of pixels that are closed, row by row, no more need be drawn.
+    #[cfg_attr(
+        not(any(feature = "cpu", feature = "gpu")),
+        expect(unused_variables, reason = "the f64 evaluation draws what is hidden, too")
+    )]
     fn draw_box(
         &self,
         volume: Volume,
