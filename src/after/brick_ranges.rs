@@ -97,7 +97,7 @@ impl BrickRanges {
     pub fn brick_list(&self, volume: &Volume, is_wanted: impl Fn(usize) -> bool + Sync) -> BrickList {
         let (dims, values) = (self.grid.dims, volume.values());
         let bricks = dims.map(|n| n.div_ceil(SIDE));
-        BrickList::by_rows(&self.grid, |y, z, flags| {
+        BrickList::by_rows(&self.grid, &|y, z, flags: &mut [bool]| {
             let first = bricks.x * (y / SIDE + bricks.y * (z / SIDE));
             let row = (dims.x * (y + dims.y * z)) as usize;
             for (at, flags) in
@@ -109,7 +109,7 @@ impl BrickRanges {
         })
     }
 
-    /// Their voxels, in memory order.
+    /// Their voxels, brick by brick.
     pub fn voxels(&self, volume: &Volume, is_wanted: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
         self.brick_list(volume, is_wanted).voxels()
     }

@@ -53,7 +53,7 @@ impl BrickList {
     }
 
     /// The bricks of the voxels whose flags are set by `flag`, which is given y and z of a row of voxels along x and their flags.
-    pub fn by_rows(grid: &Grid, flag: impl Fn(u32, u32, &mut [bool]) + Sync) -> Self {
+    pub fn by_rows(grid: &Grid, flag: &(dyn Fn(u32, u32, &mut [bool]) + Sync)) -> Self {
         let across = bricks_per_axis(grid);
         let row = |row: u32| {
             let origin = SIDE * UVec3::new(0, row % across.y, row / across.y);
@@ -88,12 +88,9 @@ impl BrickList {
         Self { grid: *grid, numbers, bricks }
     }
 
-    /// The voxels, as indices into the volume, in memory order.
+    /// The voxels, as indices into the volume, brick by brick.
     pub fn voxels(&self) -> Vec<u32> {
-        let mut all: Vec<u32> =
-            self.bricks.iter().flat_map(voxels).map(|(_, voxel)| self.grid.index_of(voxel)).collect();
-        all.par_sort_unstable();
-        all
+        self.bricks.iter().flat_map(voxels).map(|(_, voxel)| self.grid.index_of(voxel)).collect()
     }
 
     /// The bricks.

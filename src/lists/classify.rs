@@ -1,6 +1,5 @@
 //! Classification (SPEC §3): which voxels take part. Shading determines their appearance.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
 use super::brick::BrickList;
@@ -12,14 +11,16 @@ use crate::volume::Volume;
 
 /// The indices of the voxels that take part, in memory order.
 pub fn classify(volume: &Volume, transfer: &TransferFunction, clipped: &ClippedVoxels) -> Vec<u32> {
-    brick_list(volume, transfer, clipped).voxels()
+    let mut voxels = brick_list(volume, transfer, clipped).voxels();
+    voxels.sort_unstable();
+    voxels
 }
 
 /// The bricks of the voxels that take part.
 pub fn brick_list(volume: &Volume, transfer: &TransferFunction, clipped: &ClippedVoxels) -> BrickList {
     let taking_part = TakingPart::new(volume, transfer);
     let row_of = |y: u32, z: u32| volume.dims().x * (y + volume.dims().y * z);
-    BrickList::by_rows(volume.grid(), |y, z, flags| {
+    BrickList::by_rows(volume.grid(), &|y, z, flags: &mut [bool]| {
         taking_part.flag(row_of(y, z), clipped.in_row(y, z, flags.len() as u32), flags);
     })
 }
@@ -54,8 +55,8 @@ struct InChannel<'a> {
     transfer: &'a TransferFunction,
     /// The values that can take part in voxels whose labels have no tables.
     values: ValueSet,
-    /// Those of labels with tables.
-    of_labels: BTreeMap<u16, ValueSet>,
+    /// Those of labels with tables, by label.
+    of_labels: Vec<(u16, ValueSet)>,
     /// Whether values decide alone.
     is_by_value: bool,
 }
@@ -95,7 +96,7 @@ impl<'a> InChannel<'a> {
     fn of((volume, transfer): (&'a Volume, &'a TransferFunction)) -> Self {
         let labels = if volume.labels().is_some() { transfer.labels.keys() } else { Default::default() };
         let of_label = |&label: &u16| (label, ValueSet::of_tables(&transfer.tables(Some(label))));
-        let of_labels: BTreeMap<u16, ValueSet> = labels.map(of_label).collect();
+        let of_labels: Vec<_> = labels.map(of_label).collect();
         let is_by_value = of_labels.is_empty() && transfer.gradient_opacity.is_none() && volume.colors().is_none();
         Self { volume, transfer, values: ValueSet::of(transfer), of_labels, is_by_value }
     }
@@ -103,7 +104,8 @@ impl<'a> InChannel<'a> {
     fn takes_part(&self, index: u32) -> bool {
         let Self { volume, transfer, .. } = self;
         let (value, label) = (volume.values().at(index as usize), volume.label(index));
-        let values = label.and_then(|label| self.of_labels.get(&label)).unwrap_or(&self.values);
+        let own = label.and_then(|label| self.of_labels.binary_search_by_key(&label, |of| of.0).ok());
+        let values = own.map_or(&self.values, |own| &self.of_labels[own].1);
         // Most voxels are excluded by their values: the gradient is computed only if needed.
         if !values.contains(value) {
             return false;
@@ -118,6 +120,8 @@ impl<'a> InChannel<'a> {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
+    use std::collections::BTreeMap;
+
     use glam::{DVec3, UVec3};
 
     use super::*;

@@ -145,7 +145,7 @@ fn bricks_of(source: &Source, splats: &Splats, number: u32, (volume, low): (&Vol
     let (from, dims) = source.bounds(number);
     let own = Grid { dims, ..source.grid };
     let taking_part = TakingPart::new(volume, transfer);
-    let list = BrickList::by_rows(&own, |y, z, flags| {
+    let list = BrickList::by_rows(&own, &|y, z, flags: &mut [bool]| {
         let at = from + UVec3::new(0, y, z);
         let inside = clipped.in_row(at.y, at.z, from.x + dims.x);
         let inside = inside.start.saturating_sub(from.x)..inside.end.saturating_sub(from.x);
