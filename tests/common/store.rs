@@ -20,7 +20,7 @@ pub(crate) struct MemoryStore {
     pub(crate) is_range_known: bool,
     /// What identifies it.
     pub(crate) identity: &'static str,
-    /// The number of boxes that were read; only whole chunks may be, if it decodes them.
+    /// The number of boxes that were read.
     pub(crate) reads: AtomicU64,
     pub(crate) decodes_whole_chunks: bool,
 }
@@ -57,9 +57,6 @@ impl Store for MemoryStore {
             let source = std::io::Error::other("the disk is gone");
             return Err(VolumeError::io("store", source));
         }
-        let side = self.levels[0].chunk;
-        let is_chunk = from % side == UVec3::ZERO && from + dims == (from + side).min(self.volume.dims());
-        assert!(is_chunk || !self.decodes_whole_chunks, "{from} {dims}");
         self.reads.fetch_add(1, Ordering::Relaxed);
         self.read.lock().unwrap().insert(from.to_array());
         let voxels = (0..dims.z).flat_map(|z| (0..dims.y).flat_map(move |y| (0..dims.x).map(move |x| [x, y, z])));

@@ -117,19 +117,19 @@ fn decoded_chunks_are_kept() {
     let values = head.values().iter().map(|value| value * 1.001).collect();
     let volume = Volume::new("head", head.dims(), head.spacing(), values).unwrap();
     let headless = headless(Backend::Reference);
-    // The chunks that are needed take about 220 KiB, and boxes as much as chunks may.
-    let draw = |memory: u64, decodes_whole_chunks: bool| {
-        let store = Arc::new(MemoryStore { decodes_whole_chunks, ..MemoryStore::new(&volume, UVec3::new(8, 12, 10)) });
+    let draw = |memory: u64, decodes_whole_chunks: bool, chunk: UVec3| {
+        let store = Arc::new(MemoryStore { decodes_whole_chunks, ..MemoryStore::new(&volume, chunk) });
         let drawn = headless.render_volume(store::streamed(store.clone(), 0, &volume, memory), &scene).unwrap();
         let counts = drawn.stats.store.unwrap();
         assert!(counts.chunk_bytes <= memory / 2, "{counts:?}");
         (drawn.image, counts, store.reads.load(Ordering::Relaxed))
     };
-    let (image, counts, reads) = draw(1 << 20, false);
+    let (image, counts, reads) = draw(1 << 20, false, UVec3::new(4, 6, 5));
     assert!(reads > 3 * counts.chunks_read, "{reads} {counts:?}");
-    let (kept, counts, reads) = draw(1 << 20, true);
+    let (kept, counts, reads) = draw(1 << 20, true, UVec3::new(4, 6, 5));
     assert!(kept == image && reads == counts.chunks_read, "{reads} {counts:?}");
-    let (few, counts, reads) = draw(3 << 18, true);
+    // Chunks of more voxels take more than a quarter of the memory.
+    let (few, counts, reads) = draw(3 << 18, true, UVec3::new(8, 12, 10));
     assert!(reads > counts.chunks_read, "{reads} {counts:?}");
     assert_at_least(psnr(&few.pixels, &image.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, "in less memory");
 }

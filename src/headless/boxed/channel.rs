@@ -9,6 +9,7 @@ use super::kept::Kept;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::lists::iso_range::ValueSet;
+use crate::parallel::current_num_threads;
 use crate::parallel::prelude::*;
 use crate::settings::splatting::{Classification, Compositing, Splatting};
 use crate::settings::transfer_function::TransferFunction;
@@ -156,8 +157,8 @@ pub(super) struct LevelChunks<'a> {
     level: StoreLevel,
     read: HashSet<UVec3>,
     bytes_read: u64,
-    /// Chunks of a store that decodes them as a whole.
-    kept: Kept,
+    /// Chunks, if the store decodes them as a whole, and there is room for as many as are read at once.
+    kept: Option<Kept>,
 }
 
 /// What was read of a chunk for a box: the first voxel and the voxels along each axis, their values, and the bytes of the store; no bytes if the store does not hold
@@ -179,7 +180,10 @@ impl<'a> LevelChunks<'a> {
             let allowed = format!("at most {MOST_CHUNKS} chunks of at least 1 voxel");
             return Err(SettingError::new("volume", found, allowed));
         }
-        Ok(Self { of, level, read: HashSet::new(), bytes_read: 0, kept: Kept::new(kept) })
+        let values = level.chunk.min(level.grid.dims).as_u64vec3().element_product();
+        let at_once = values.saturating_mul(size_of::<f32>() as u64).saturating_mul(current_num_threads() as u64);
+        let is_kept = of.store.decodes_whole_chunks() && at_once <= kept;
+        Ok(Self { of, level, read: HashSet::new(), bytes_read: 0, kept: is_kept.then(|| Kept::new(kept)) })
     }
 
     /// The number of chunks of which something was read.
@@ -194,7 +198,7 @@ impl<'a> LevelChunks<'a> {
 
     /// The most bytes that decoded chunks took at a time.
     pub(super) fn most_kept(&self) -> u64 {
-        self.kept.most_held()
+        self.kept.as_ref().map_or(0, Kept::most_held)
     }
 
     /// The chunks that share voxels with a box.
@@ -231,20 +235,20 @@ impl<'a> LevelChunks<'a> {
         if !store.contains(*level, chunk)? {
             return Ok(Piece { chunk, low, dims, values, bytes: None });
         }
-        if !store.decodes_whole_chunks() {
+        let Some(kept) = &self.kept else {
             let bytes = Some(store.read(*level, low, dims, &mut values)?);
             return Ok(Piece { chunk, low, dims, values, bytes });
-        }
+        };
         let first = chunk * side;
         let whole = self.level.grid.part(first, self.level.grid.dims.min(first + side) - first);
-        let (decoded, bytes) = match self.kept.get(chunk) {
+        let (decoded, bytes) = match kept.get(chunk) {
             // Its bytes have been counted.
             Some(decoded) => (decoded, 0),
             None => {
                 let mut decoded = vec![store.fill(); whole.dims.element_product() as usize];
                 let bytes = store.read(*level, first, whole.dims, &mut decoded)?;
                 let decoded = Arc::new(Values::from(decoded).narrowed());
-                self.kept.keep(chunk, &decoded);
+                kept.keep(chunk, &decoded);
                 (decoded, bytes)
             }
         };
