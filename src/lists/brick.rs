@@ -82,8 +82,7 @@ impl BrickList {
         let bricks = rows.concat();
         let mut numbers = vec![NONE; across.element_product() as usize];
         for (brick, number) in bricks.iter().zip(0..) {
-            let at = origin(brick) / SIDE;
-            numbers[(at.x + across.x * (at.y + across.y * at.z)) as usize] = number;
+            numbers[brick_of(grid, grid.index_of(origin(brick))) as usize] = number;
         }
         Self { grid: *grid, numbers, bricks }
     }

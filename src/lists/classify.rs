@@ -127,7 +127,7 @@ mod tests {
     use super::*;
     use crate::settings::clip::Clip;
     use crate::settings::transfer_function::{LabelTables, Ramp};
-    use crate::volume::Labels;
+    use crate::volume::{Labels, SampleType};
 
     const DIMS: UVec3 = UVec3::new(11, 6, 9);
 
@@ -149,6 +149,12 @@ mod tests {
         };
         let labelled = volume(whole(2)).with_labels(labels).unwrap();
         let two = volume(whole(1)).with_channels("noise", vec![volume(holed.clone().collect())]).unwrap();
+        // A is 0 in a third of the voxels.
+        let color = |index: u32| {
+            [0, 20, 40, 60].map(|seed| noise(index, seed) as f32 % 200.0).map(|n| if n < 66.0 { 0.0 } else { n })
+        };
+        let colors: Vec<[f32; 4]> = (0..count).map(color).collect();
+        let colored = Volume::from_colors("colors", DIMS, DVec3::ONE, (&colors, SampleType::U8)).unwrap();
         let ramp = |points: &[(f64, f64)]| Ramp::new(points.to_vec()).unwrap();
         let by_value = TransferFunction::by_value(
             Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(),
@@ -177,6 +183,7 @@ mod tests {
             ("labels", &labelled, &of_labels),
             ("unused labels", &labelled, &by_value),
             ("channels", &two, &of_two),
+            ("colours", &colored, &by_value),
         ] {
             for clip in [&Clip::default(), &cut] {
                 let clipped = clip.voxels(volume.grid(), 2.0);
@@ -184,7 +191,8 @@ mod tests {
                     channels(volume, transfer).any(|(volume, transfer)| {
                         let gradient = volume.gradient(volume.grid().voxel_at(index)).length();
                         let value = f64::from(volume.values().at(index as usize));
-                        !value.is_nan() && transfer.tables(volume.label(index)).alpha(value, gradient) > 0.0
+                        let is_shown = transfer.tables(volume.label(index)).alpha(value, gradient) > 0.0;
+                        !value.is_nan() && is_shown && volume.color(index).is_none_or(|color| color.w > 0.0)
                     })
                 };
                 let expected: Vec<u32> = (0..count)
