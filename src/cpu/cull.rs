@@ -122,6 +122,11 @@ impl OpenMask {
         self.joined[0][row]
     }
 
+    /// The same of several rows, the last one included.
+    pub(super) fn rows_between(&self, first: usize, last: usize) -> impl Iterator<Item = u32> {
+        self.joined[0][first..=last].iter().copied()
+    }
+
     /// Marks pixels of a row as opaque. [`Self::sees`] takes them into account after [`Self::join`].
     pub(super) fn close(&mut self, row: usize, opaque: u32) {
         self.joined[0][row] &= !opaque;

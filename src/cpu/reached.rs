@@ -8,22 +8,30 @@ use super::cull::{OpenMask, Pixels};
 use super::sheets::{COLUMNS, ROWS};
 use super::vector::{LANES, iota};
 
-/// A whole vector fits in behind the last pixel.
-const CAPACITY: usize = ROWS * COLUMNS + LANES;
+/// The pixels from which on a list is full.
+const FULL: usize = 512;
 
-/// A list of pixels.
+/// A footprint more fits in, whatever its size, and a whole vector behind its last pixel.
+const CAPACITY: usize = FULL + ROWS * COLUMNS + LANES;
+
+/// A list of pixels, those of one footprint after those of another.
 #[derive(Debug)]
 pub(super) struct Reached {
     pub(super) count: usize,
     /// Their indices in the tile.
     pub(super) pixels: Box<[u32; CAPACITY]>,
     /// Numbers for each of them; what they mean depends on who lists them.
-    pub(super) numbers: Box<[[f32; CAPACITY]; 3]>,
+    pub(super) numbers: Box<[[f32; CAPACITY]; 2]>,
 }
 
 impl Reached {
     pub(super) fn new() -> Self {
-        Self { count: 0, pixels: Box::new([0; CAPACITY]), numbers: Box::new([[0.0; CAPACITY]; 3]) }
+        Self { count: 0, pixels: Box::new([0; CAPACITY]), numbers: Box::new([[0.0; CAPACITY]; 2]) }
+    }
+
+    /// Whether there may be no room for another footprint.
+    pub(super) fn is_full(&self) -> bool {
+        self.count >= FULL
     }
 
     /// Lists the open pixels of a box that a footprint reaches. `footprint` tells of eight pixels, given by their offsets from its centre, which are
@@ -39,13 +47,14 @@ impl Reached {
     ) {
         let Pixels { columns: [left, right], rows: [first, last] } = *pixels;
         let (list, lists) = (&mut *self.pixels, &mut *self.numbers);
-        let mut count = 0;
-        for column in (left..=right).step_by(LANES) {
+        let mut count = self.count.min(FULL);
+        let mut column = left;
+        while column <= right {
             let dx = iota(simd) + (column as f32 - center[0]);
             let columns = u32x8::load_array(simd, [0, 1, 2, 3, 4, 5, 6, 7]) + column as u32;
-            for row in first..=last {
+            for (row, open) in (first..).zip(open.rows_between(first, last)) {
                 let (is_reached, numbers) = footprint(dx, row as f32 - center[1]);
-                let bits = is_reached.to_bitmask() & u64::from(open.row(row) >> column & 0xff);
+                let bits = is_reached.to_bitmask() & u64::from(open >> column & 0xff);
                 let listed = mask32x8::from_bitmask(simd, bits);
                 (columns + (row * COLUMNS) as u32).compress(listed).store_slice(&mut list[count..count + LANES]);
                 for (list, numbers) in lists.iter_mut().zip(&numbers) {
@@ -53,6 +62,7 @@ impl Reached {
                 }
                 count += bits.count_ones() as usize;
             }
+            column += LANES;
         }
         self.count = count;
     }

@@ -10,6 +10,9 @@ use super::reached::Reached;
 use super::sheets::{BySlot, CHANNELS, HALF_RING, PixelSums, RING, Ring, SECTIONS, Sums, slot_of};
 use super::vector::LANES;
 
+/// The footprints that are listed together at the most.
+const MOST_FOOTPRINTS: usize = 16;
+
 /// A voxel in the coordinates of a tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Splat {
@@ -31,6 +34,14 @@ pub(super) struct Splat {
     pub(super) drawn: u32,
     /// In perspective.
     pub(super) local: LocalFootprint,
+}
+
+impl Splat {
+    /// The number of sections to be drawn next.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn sections(&self) -> usize {
+        ((self.sheets[1] - self.sheets[0]) as usize).min(SECTIONS)
+    }
 }
 
 /// How a kernel lies on the screen in perspective: as [`Local`](super::project::Local), in f32.
@@ -57,8 +68,8 @@ pub(super) struct Splatter {
 }
 
 /// The sections of a splat in up to [`SECTIONS`] sheets, by slot. Slots without a section have planes at one place.
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sections {
-    count: usize,
     /// `H(0, 0, t)` of eq. 3 at the planes before the sections.
     near: BySlot,
     /// The same behind them.
@@ -67,8 +78,31 @@ pub(super) struct Sections {
     along: BySlot,
     across: BySlot,
     amplitude: BySlot,
-    /// The pixels that any of them reaches; `None` for no pixel of the tile.
-    pub(super) pixels: Option<Pixels>,
+}
+
+/// Footprints that are listed together: the pixels that they reach, which are added to the sheets later.
+#[derive(Debug)]
+pub(super) struct Footprints {
+    reached: Reached,
+    /// Their sections, colours, and where their pixels end in the list.
+    all: [(Sections, [f32; CHANNELS], usize); MOST_FOOTPRINTS],
+    count: usize,
+}
+
+impl Footprints {
+    pub(super) fn new() -> Self {
+        Self { reached: Reached::new(), all: Default::default(), count: 0 }
+    }
+
+    /// Whether there may be no room for another one.
+    pub(super) fn is_full(&self) -> bool {
+        self.count == MOST_FOOTPRINTS || self.reached.is_full()
+    }
+
+    /// Forgets all of them.
+    pub(super) fn clear(&mut self) {
+        (self.count, self.reached.count) = (0, 0);
+    }
 }
 
 /// The number of sheets from that of a slot on to that of every slot; [`RING`] where a vector's number belongs to no slot.
@@ -87,24 +121,16 @@ fn order_from<S: Simd>(simd: S, slot: usize) -> f32x8<S> {
 }
 
 impl Splatter {
-    /// The sections to be drawn next.
+    /// The sections to be drawn next, and the pixels that any of them reaches; `None` for no pixel of the tile.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn sections<S: Simd>(&self, simd: S, splat: &Splat) -> Sections {
+    pub(super) fn sections<S: Simd>(&self, simd: S, splat: &Splat) -> (Sections, Option<Pixels>) {
         let splat_f32 = |number: f32| f32x8::splat(simd, number);
-        let count = ((splat.sheets[1] - splat.sheets[0]) as usize).min(SECTIONS);
+        let count = splat.sections();
         let order = order_from(simd, slot_of(splat.sheets[0]));
         let end = splat_f32(count as f32);
         let mut near = order.min(end) * splat.step + splat.first_plane;
         let mut far = (order + 1.0).min(end) * splat.step + splat.first_plane;
-        let mut sections = Sections {
-            count,
-            near: [0.0; LANES],
-            far: [0.0; LANES],
-            along: [0.0; LANES],
-            across: [0.0; LANES],
-            amplitude: [0.0; LANES],
-            pixels: Some(splat.pixels),
-        };
+        let (mut sections, mut pixels) = (Sections::default(), Some(splat.pixels));
         if let Some(pixel_per_depth) = self.pixel_per_depth {
             let local = &splat.local;
             let cut = splat_f32(local.cut);
@@ -125,107 +151,110 @@ impl Splatter {
             let [x, y] = local.axis.map(|component| component * component);
             let width = (one / along * x + one / across * y).sqrt() * self.kernel.support;
             let height = (one / along * y + one / across * x).sqrt() * self.kernel.support;
-            sections.pixels = Pixels::within(splat.center, [width.reduce_max(), height.reduce_max()]);
+            pixels = Pixels::within(splat.center, [width.reduce_max(), height.reduce_max()]);
             (sections.along, sections.across) = (along.to_array(), across.to_array());
             sections.amplitude = amplitude.to_array();
         }
         let (near, far) = self.kernel.along(simd, near.combine(far)).split();
         (sections.near, sections.far) = (near.to_array(), far.to_array());
-        sections
+        (sections, pixels)
     }
 
-    /// Adds sections to the open pixels of a tile.
+    /// Lists the open pixels of a tile that a splat's sections reach.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn draw<S: Simd>(
+    pub(super) fn list<S: Simd>(
         &self,
         simd: S,
         splat: &Splat,
         sections: &Sections,
-        open: &OpenMask,
-        (reached, ring): (&mut Reached, &mut Ring),
+        (pixels, open): (&Pixels, &OpenMask),
+        footprints: &mut Footprints,
     ) {
-        let Some(pixels) = &sections.pixels else { return };
+        let Footprints { reached, all, count } = footprints;
+        let limit = f32x8::splat(simd, self.kernel.support_squared);
         match self.pixel_per_depth {
-            None => self.draw_flat(simd, splat, sections, (pixels, open), (reached, ring)),
-            Some(_) => self.draw_local(simd, splat, sections, (pixels, open), (reached, ring)),
+            // All sections have one footprint.
+            None => {
+                let [xx, xy, yy] = self.metric;
+                reached.list(
+                    simd,
+                    splat.center,
+                    pixels,
+                    open,
+                    #[cfg_attr(not(debug_assertions), inline(always))]
+                    move |dx, dy| {
+                        let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
+                        (rho_squared.simd_lt(limit), [rho_squared])
+                    },
+                );
+            }
+            // Every section has its own, of the size that pixels have at its middle.
+            Some(_) => {
+                let load = |numbers: BySlot| f32x8::load_array(simd, numbers);
+                // Of the largest section's footprint.
+                let (least_along, least_across) =
+                    (load(sections.along).reduce_min(), load(sections.across).reduce_min());
+                let [x, y] = splat.local.axis;
+                reached.list(
+                    simd,
+                    splat.center,
+                    pixels,
+                    open,
+                    #[cfg_attr(not(debug_assertions), inline(always))]
+                    move |dx, dy| {
+                        let (along, across) = (dx * x + dy * y, dx * -y + dy * x);
+                        let (along, across) = (along * along, across * across);
+                        ((along * least_along + across * least_across).simd_lt(limit), [along, across])
+                    },
+                );
+            }
         }
-        ring.mark(pixels.columns, pixels.rows, slot_of(splat.sheets[0]), sections.count);
+        all[*count % MOST_FOOTPRINTS] = (*sections, splat.amount, reached.count);
+        *count += 1;
     }
 
-    /// Without perspective all sections have one footprint.
+    /// Adds the listed footprints to the sheets, one after the other.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn draw_flat<S: Simd>(
-        &self,
-        simd: S,
-        splat: &Splat,
-        sections: &Sections,
-        (pixels, open): (&Pixels, &OpenMask),
-        (reached, ring): (&mut Reached, &mut Ring),
-    ) {
-        let [xx, xy, yy] = self.metric;
-        let limit = f32x8::splat(simd, self.kernel.support_squared);
-        reached.list(
-            simd,
-            splat.center,
-            pixels,
-            open,
-            #[cfg_attr(not(debug_assertions), inline(always))]
-            move |dx, dy| {
-                let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
-                (rho_squared.simd_lt(limit), [rho_squared])
-            },
-        );
-        let [first, second, _] = &mut *reached.numbers;
-        for at in (0..reached.count).step_by(LANES) {
-            let rho_squared = f32x8::from_slice(simd, &first[at..at + LANES]);
-            self.kernel.rim(simd, rho_squared).store_slice(&mut first[at..at + LANES]);
-            self.kernel.in_plane(simd, rho_squared).store_slice(&mut second[at..at + LANES]);
+    pub(super) fn add<S: Simd>(&self, simd: S, footprints: &mut Footprints, ring: &mut Ring) {
+        let is_flat = self.pixel_per_depth.is_none();
+        let Footprints { reached, all, count } = &mut *footprints;
+        let Reached { count: listed, pixels, numbers } = reached;
+        let [first, second] = &mut **numbers;
+        if is_flat {
+            let vectors = first.chunks_exact_mut(LANES).zip(second.chunks_exact_mut(LANES));
+            for (first, second) in vectors.take(listed.div_ceil(LANES)) {
+                let rho_squared = f32x8::from_slice(simd, first);
+                self.kernel.rim(simd, rho_squared).store_slice(first);
+                self.kernel.in_plane(simd, rho_squared).store_slice(second);
+            }
         }
-        let (near, far) = (f32x8::load_array(simd, sections.near), f32x8::load_array(simd, sections.far));
-        let (color, sums) = (splatted(simd, splat.amount), &mut ring.pixels);
-        for ((&pixel, &rim), &in_plane) in reached.pixels[..reached.count].iter().zip(&*first).zip(&*second) {
-            let rim = f32x8::splat(simd, rim);
-            add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
+        let mut start = 0;
+        for (sections, color, end) in &all[..*count] {
+            let range = start..*end;
+            start = *end;
+            let numbers = first[range.clone()].iter().zip(&second[range.clone()]);
+            let pixels = pixels[range].iter().zip(numbers);
+            let load = |numbers: BySlot| f32x8::load_array(simd, numbers);
+            let (near, far) = (load(sections.near), load(sections.far));
+            let (color, sums) = (splatted(simd, *color), &mut ring.pixels);
+            if is_flat {
+                for (&pixel, (&rim, &in_plane)) in pixels {
+                    let rim = f32x8::splat(simd, rim);
+                    let weights = (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane;
+                    add(simd, weights, color, &mut sums[pixel as usize]);
+                }
+                continue;
+            }
+            let (to_along, to_across) = (load(sections.along), load(sections.across));
+            let amplitude = load(sections.amplitude);
+            for (&pixel, (&along, &across)) in pixels {
+                let rho_squared = to_along * along + to_across * across;
+                let rim = self.kernel.rim(simd, rho_squared);
+                let in_plane = self.kernel.in_plane(simd, rho_squared) * amplitude;
+                add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
+            }
         }
-    }
-
-    /// In perspective every section has its own footprint, of the size that pixels have at its middle.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn draw_local<S: Simd>(
-        &self,
-        simd: S,
-        splat: &Splat,
-        sections: &Sections,
-        (pixels, open): (&Pixels, &OpenMask),
-        (reached, ring): (&mut Reached, &mut Ring),
-    ) {
-        let load = |numbers: BySlot| f32x8::load_array(simd, numbers);
-        let (to_along, to_across, amplitude) = (load(sections.along), load(sections.across), load(sections.amplitude));
-        // Of the largest section's footprint.
-        let (least_along, least_across) = (to_along.reduce_min(), to_across.reduce_min());
-        let [x, y] = splat.local.axis;
-        let limit = f32x8::splat(simd, self.kernel.support_squared);
-        reached.list(
-            simd,
-            splat.center,
-            pixels,
-            open,
-            #[cfg_attr(not(debug_assertions), inline(always))]
-            move |dx, dy| {
-                let (along, across) = (dx * x + dy * y, dx * -y + dy * x);
-                let (along, across) = (along * along, across * across);
-                ((along * least_along + across * least_across).simd_lt(limit), [along, across])
-            },
-        );
-        let (near, far) = (load(sections.near), load(sections.far));
-        let [along, across, _] = &*reached.numbers;
-        let (color, sums) = (splatted(simd, splat.amount), &mut ring.pixels);
-        for ((&pixel, &along), &across) in reached.pixels[..reached.count].iter().zip(along).zip(across) {
-            let rho_squared = to_along * along + to_across * across;
-            let rim = self.kernel.rim(simd, rho_squared);
-            let in_plane = self.kernel.in_plane(simd, rho_squared) * amplitude;
-            add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
-        }
+        footprints.clear();
     }
 }
 

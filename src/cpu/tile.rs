@@ -15,9 +15,8 @@ use super::cut::TileRays;
 use super::frame::{Frame, Voxels};
 use super::project::Place;
 use super::queue::{Queue, Waiting};
-use super::reached::Reached;
 use super::sheets::{Buffers, COLUMNS, RING, ROWS, Ring, SECTIONS, slot_of};
-use super::splat::Splat;
+use super::splat::{Footprints, Splat};
 use super::stream::{Approach, Chunk, Stream};
 use super::vector::LANES;
 use crate::lists::brick;
@@ -71,7 +70,7 @@ pub(super) struct TileWalk<'a> {
     open: OpenMask,
     rays: TileRays,
     ring: Ring,
-    reached: Reached,
+    footprints: Footprints,
     buffers: Buffers,
     /// The chunks of a store that may be seen from some sheet on.
     approach: Approach,
@@ -96,7 +95,7 @@ impl<'a> TileWalk<'a> {
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
             ring: Ring::new(),
-            reached: Reached::new(),
+            footprints: Footprints::new(),
             buffers: Buffers::new(),
             approach: Approach::default(),
             read: Vec::new(),
@@ -300,7 +299,10 @@ impl<'a> TileWalk<'a> {
         for splat in &continued {
             self.draw_splat(simd, splat);
         }
-        let Some(mut starting) = self.queue.advance() else { return };
+        let Some(mut starting) = self.queue.advance() else {
+            self.add_footprints(simd);
+            return;
+        };
         if self.frame.is_each {
             starting = self.sorted_by_depth(&starting);
         }
@@ -318,6 +320,7 @@ impl<'a> TileWalk<'a> {
         }
         self.start_voxels(simd, &mut starts, sheet, &mut batch);
         self.draw_batch(simd, &mut batch);
+        self.add_footprints(simd);
         self.queue.reuse(starting);
     }
 
@@ -404,22 +407,26 @@ impl<'a> TileWalk<'a> {
         );
     }
 
-    /// Draws a voxel's next sections, if they are seen, and keeps it if there are more.
+    /// Lists the pixels of a voxel's next sections, if they are seen, and keeps the voxel if it has more.
     fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let splatter = &self.frame.splatter;
-                let sections = splatter.sections(simd, splat);
+                let (sections, pixels) = splatter.sections(simd, splat);
                 let [first, end] = splat.sheets;
                 let next = end.min(first + SECTIONS as i32);
-                if sections.pixels.is_some_and(|pixels| self.open.sees(&pixels)) {
-                    splatter.draw(simd, splat, &sections, &self.open, (&mut self.reached, &mut self.ring));
+                if let Some(pixels) = pixels.filter(|pixels| self.open.sees(pixels)) {
+                    splatter.list(simd, splat, &sections, (&pixels, &self.open), &mut self.footprints);
+                    self.ring.mark(pixels.columns, pixels.rows, slot_of(first), splat.sections());
                     let [brick, slot] = splat.voxel;
                     let masks = self.frame.drawn.masks;
                     let part = (1 + splat.drawn as usize).min(masks - 1);
                     self.marks[brick as usize * masks + part] |= 1 << slot;
+                    if self.frame.is_each || self.footprints.is_full() {
+                        self.add_footprints(simd);
+                    }
                     if self.frame.is_each {
                         self.composite(simd, first);
                     }
@@ -433,6 +440,17 @@ impl<'a> TileWalk<'a> {
                     });
                     self.pending += 1;
                 }
+            },
+        );
+    }
+
+    /// Adds the footprints that are listed to the sheets.
+    fn add_footprints<S: Simd>(&mut self, simd: S) {
+        simd.vectorize(
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            || {
+                let Self { frame, footprints, ring, .. } = self;
+                frame.splatter.add(simd, footprints, ring);
             },
         );
     }
