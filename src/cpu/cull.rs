@@ -122,9 +122,11 @@ impl OpenMask {
         self.joined[0][row]
     }
 
-    /// The same of several rows, the last one included.
-    pub(super) fn rows_between(&self, first: usize, last: usize) -> impl Iterator<Item = u32> {
-        self.joined[0][first..=last].iter().copied()
+    /// The bits of some open columns of a row, from one on; none behind the last row.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn bits(&self, row: usize, column: usize, count: usize) -> u64 {
+        let bits = if row < ROWS { self.joined[0][row] } else { 0 };
+        u64::from(bits >> column & !(u32::MAX << count))
     }
 
     /// Marks pixels of a row as opaque. [`Self::sees`] takes them into account after [`Self::join`].

@@ -50,7 +50,7 @@ const NO_SUMS: PixelSums = [Sums([0.0; 2 * CHANNELS]); HALF_RING];
 #[derive(Debug)]
 pub(super) struct Ring {
     /// The sums of pixels, row by row.
-    pub(super) pixels: Vec<PixelSums>,
+    pub(super) pixels: Box<[PixelSums; ROWS * COLUMNS]>,
     /// Which vectors of a row's columns are not empty: those of the first slot in the lowest bits, and so on.
     written: [u32; ROWS],
 }
@@ -84,7 +84,7 @@ pub(super) struct Buffers {
 impl Ring {
     /// Empty sheets.
     pub(super) fn new() -> Self {
-        Self { pixels: vec![NO_SUMS; ROWS * COLUMNS], written: [0; ROWS] }
+        Self { pixels: Box::new([NO_SUMS; ROWS * COLUMNS]), written: [0; ROWS] }
     }
 
     /// Records that pixels within a box were written to in some slots, from one on.

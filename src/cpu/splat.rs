@@ -7,8 +7,12 @@ use fearless_simd::{f32x4, f32x8, u8x32};
 use super::cull::{OpenMask, Pixels};
 use super::kernel::KernelTables;
 use super::reached::Reached;
-use super::sheets::{BySlot, CHANNELS, HALF_RING, PixelSums, RING, Ring, SECTIONS, Sums, slot_of};
+use super::sheets::{BySlot, CHANNELS, COLUMNS, HALF_RING, PixelSums, RING, ROWS, Ring, SECTIONS, Sums, slot_of};
 use super::vector::LANES;
+
+/// Slack around footprints' boxes in perspective: pixels, and a fraction of the box.
+const SLACK: f32 = 1e-3;
+const RELATIVE_SLACK: f32 = 1e-5;
 
 /// The footprints that are listed together at the most.
 const MOST_FOOTPRINTS: usize = 16;
@@ -151,7 +155,9 @@ impl Splatter {
             let [x, y] = local.axis.map(|component| component * component);
             let width = (one / along * x + one / across * y).sqrt() * self.kernel.support;
             let height = (one / along * y + one / across * x).sqrt() * self.kernel.support;
-            pixels = Pixels::within(splat.center, [width.reduce_max(), height.reduce_max()]);
+            // The box contains the footprint whatever is rounded, so that the footprint alone decides, and not the vectors that cover the box.
+            let half_box = [width.reduce_max(), height.reduce_max()].map(|half| half * (1.0 + RELATIVE_SLACK) + SLACK);
+            pixels = Pixels::within(splat.center, half_box);
             (sections.along, sections.across) = (along.to_array(), across.to_array());
             sections.amplitude = amplitude.to_array();
         }
@@ -171,7 +177,7 @@ impl Splatter {
         footprints: &mut Footprints,
     ) {
         let Footprints { reached, all, count } = footprints;
-        let limit = f32x8::splat(simd, self.kernel.support_squared);
+        let limit = S::f32s::splat(simd, self.kernel.support_squared);
         match self.pixel_per_depth {
             // All sections have one footprint.
             None => {
@@ -182,8 +188,8 @@ impl Splatter {
                     pixels,
                     open,
                     #[cfg_attr(not(debug_assertions), inline(always))]
-                    move |dx, dy| {
-                        let rho_squared = dx * (dx * xx + xy * dy) + yy * dy * dy;
+                    move |[dx, dy]: [S::f32s; 2]| {
+                        let rho_squared = dx * (dx * xx + dy * xy) + dy * yy * dy;
                         (rho_squared.simd_lt(limit), [rho_squared])
                     },
                 );
@@ -201,7 +207,7 @@ impl Splatter {
                     pixels,
                     open,
                     #[cfg_attr(not(debug_assertions), inline(always))]
-                    move |dx, dy| {
+                    move |[dx, dy]: [S::f32s; 2]| {
                         let (along, across) = (dx * x + dy * y, dx * -y + dy * x);
                         let (along, across) = (along * along, across * across);
                         ((along * least_along + across * least_across).simd_lt(limit), [along, across])
@@ -236,12 +242,12 @@ impl Splatter {
             let pixels = pixels[range].iter().zip(numbers);
             let load = |numbers: BySlot| f32x8::load_array(simd, numbers);
             let (near, far) = (load(sections.near), load(sections.far));
-            let (color, sums) = (splatted(simd, *color), &mut ring.pixels);
+            let (color, sums) = (splatted(simd, *color), &mut *ring.pixels);
             if is_flat {
                 for (&pixel, (&rim, &in_plane)) in pixels {
                     let rim = f32x8::splat(simd, rim);
                     let weights = (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane;
-                    add(simd, weights, color, &mut sums[pixel as usize]);
+                    add(simd, weights, color, &mut sums[pixel as usize % (ROWS * COLUMNS)]);
                 }
                 continue;
             }
@@ -251,7 +257,7 @@ impl Splatter {
                 let rho_squared = to_along * along + to_across * across;
                 let rim = self.kernel.rim(simd, rho_squared);
                 let in_plane = self.kernel.in_plane(simd, rho_squared) * amplitude;
-                add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize]);
+                add(simd, (cut_by_rim(far, rim) - cut_by_rim(near, rim)) * in_plane, color, &mut sums[pixel as usize % (ROWS * COLUMNS)]);
             }
         }
         footprints.clear();
