@@ -5,7 +5,6 @@
 
 use std::f64::consts::LOG2_E;
 
-use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 
 use super::vector::{exp2, polynomial, short_polynomial};
@@ -73,8 +72,8 @@ impl KernelTables {
 
     /// The Gaussian of ρ².
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn in_plane<S: Simd>(&self, simd: S, rho_squared: f32x8<S>) -> f32x8<S> {
+    pub(super) fn in_plane<S: Simd, V: SimdFloat<S, Element = f32>>(&self, simd: S, rho_squared: V) -> V {
         // Far from the voxel the rim is 0; the other factor must be finite.
-        exp2(simd, (rho_squared * self.exponent).max(f32x8::splat(simd, -126.0)))
+        exp2(simd, (rho_squared * self.exponent).max(V::splat(simd, -126.0)))
     }
 }

@@ -8,7 +8,6 @@ use super::cull::{OpenMask, Pixels};
 use super::kernel::KernelTables;
 use super::reached::Reached;
 use super::sheets::{BySlot, CHANNELS, COLUMNS, HALF_RING, PixelSums, RING, ROWS, Ring, SECTIONS, Sums, slot_of};
-use super::vector::LANES;
 
 /// Slack around footprints' boxes in perspective: pixels, and a fraction of the box.
 const SLACK: f32 = 1e-3;
@@ -227,9 +226,9 @@ impl Splatter {
         let Reached { count: listed, pixels, numbers } = reached;
         let [first, second] = &mut **numbers;
         if is_flat {
-            let vectors = first.chunks_exact_mut(LANES).zip(second.chunks_exact_mut(LANES));
-            for (first, second) in vectors.take(listed.div_ceil(LANES)) {
-                let rho_squared = f32x8::from_slice(simd, first);
+            let vectors = first.chunks_exact_mut(S::f32s::LEN).zip(second.chunks_exact_mut(S::f32s::LEN));
+            for (first, second) in vectors.take(listed.div_ceil(S::f32s::LEN)) {
+                let rho_squared = S::f32s::from_slice(simd, first);
                 self.kernel.rim(simd, rho_squared).store_slice(first);
                 self.kernel.in_plane(simd, rho_squared).store_slice(second);
             }

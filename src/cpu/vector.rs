@@ -42,9 +42,9 @@ fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
 
 /// `2^x` as `2^n` and `2^f - 1`, with `x = n + f` and n whole, for x from -126 to 126.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn exp2_parts<S: Simd>(simd: S, x: f32x8<S>) -> (f32x8<S>, f32x8<S>) {
+fn exp2_parts<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> (V, V) {
     // Adding 1.5·2²³ rounds to a whole number, which is then in the low bits.
-    let magic = f32x8::splat(simd, 12_582_912.0);
+    let magic = V::splat(simd, 12_582_912.0);
     let rounded = x + magic;
     let f = x - (rounded - magic);
     let squared = f * f;
@@ -52,13 +52,12 @@ fn exp2_parts<S: Simd>(simd: S, x: f32x8<S>) -> (f32x8<S>, f32x8<S>) {
     let middle = f * EXP2[3] + EXP2[2];
     let high = f * EXP2[5] + EXP2[4];
     let less_one = f * (low + squared * (middle + squared * high));
-    let power: u32x8<S> = (rounded.bitcast::<u32x8<S>>() << MANTISSA) + u32x8::splat(simd, 127 << MANTISSA);
-    (power.bitcast(), less_one)
+    (V::from_bits((rounded.to_bits() << MANTISSA) + (127 << MANTISSA)), less_one)
 }
 
 /// `2^x`, for x from -126 to 126.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn exp2<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
+pub(super) fn exp2<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V {
     let (power, less_one) = exp2_parts(simd, x);
     power + power * less_one
 }
