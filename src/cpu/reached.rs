@@ -8,7 +8,7 @@ use super::sheets::{COLUMNS, ROWS};
 use super::vector::LANES;
 
 /// The pixels of the largest vector.
-const WIDEST: usize = 2 * LANES;
+pub(super) const WIDEST: usize = 2 * LANES;
 
 /// The pixels from which on a list is full.
 const FULL: usize = 512;

@@ -413,13 +413,11 @@ impl<'a> TileWalk<'a> {
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
-                let splatter = &self.frame.splatter;
-                let (sections, pixels) = splatter.sections(simd, splat);
+                let Self { frame, open, footprints, ring, .. } = &mut *self;
                 let [first, end] = splat.sheets;
                 let next = end.min(first + SECTIONS as i32);
-                if let Some(pixels) = pixels.filter(|pixels| self.open.sees(pixels)) {
-                    splatter.list(simd, splat, &sections, (&pixels, &self.open), &mut self.footprints);
-                    self.ring.mark(pixels.columns, pixels.rows, slot_of(first), splat.sections());
+                if let Some(pixels) = frame.splatter.list(simd, splat, open, footprints) {
+                    ring.mark(pixels.columns, pixels.rows, slot_of(first), splat.sections());
                     let [brick, slot] = splat.voxel;
                     let masks = self.frame.drawn.masks;
                     let part = (1 + splat.drawn as usize).min(masks - 1);
