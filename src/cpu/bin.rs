@@ -20,7 +20,7 @@ pub(super) struct Placed {
     /// Its number in the list of bricks.
     pub(super) brick: u32,
     /// The channel whose brick it is, where each has bricks of its own.
-    pub(super) channel: usize,
+    pub(super) channel: u16,
     /// The first sheet that its kernels may reach.
     pub(super) first: i32,
     /// The sheet behind the last one.
@@ -31,8 +31,8 @@ pub(super) struct Placed {
     pub(super) middle: [f32; 2],
     pub(super) half: [f32; 2],
     /// The tiles that its footprints may touch: the first and last column, and the first and last row.
-    pub(super) columns: [usize; 2],
-    pub(super) rows: [usize; 2],
+    pub(super) columns: [u16; 2],
+    pub(super) rows: [u16; 2],
 }
 
 /// The number of columns of tiles in an image.
@@ -42,30 +42,38 @@ pub(super) fn columns(size: [u32; 2]) -> usize {
 
 /// The bricks that may be on the image, by first sheet and then in memory order.
 pub(super) fn place(bricks: &[Brick], projection: &Projection, support: f64) -> Vec<Placed> {
-    let numbered = bricks.par_iter().enumerate();
-    by_first(numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support)).collect())
+    /// The bricks that a thread places at a time.
+    const AT_A_TIME: usize = 1024;
+    let of_chunk = |(chunk, bricks): (usize, &[Brick])| {
+        let numbered = (chunk * AT_A_TIME..).zip(bricks);
+        let placed = numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support));
+        placed.collect::<Vec<_>>()
+    };
+    by_first(&bricks.par_chunks(AT_A_TIME).enumerate().map(of_chunk).collect::<Vec<_>>())
 }
 
-/// Sorts bricks by first sheet; those that share it keep their order.
-pub(super) fn by_first(placed: Vec<Placed>) -> Vec<Placed> {
+/// Sorts the bricks of several lists by first sheet; those that share it keep their order.
+pub(super) fn by_first(lists: &[Vec<Placed>]) -> Vec<Placed> {
     let first = |placed: &Placed| placed.first;
-    let Some(least) = placed.iter().map(first).min() else { return placed };
+    let Some(least) = lists.iter().flatten().map(first).min() else { return Vec::new() };
     // How many begin before each sheet.
     let mut before = Vec::new();
-    for placed in &placed {
+    for placed in lists.iter().flatten() {
         let next = (placed.first - least) as usize + 1;
         before.resize(before.len().max(next + 1), 0_u32);
         before[next] += 1;
     }
     let mut sum = 0;
     before.iter_mut().for_each(|count| (sum, *count) = (sum + *count, sum + *count));
-    let mut order = vec![0; placed.len()];
-    for (at, placed) in placed.iter().enumerate() {
-        let place = &mut before[(placed.first - least) as usize];
-        order[*place as usize] = at;
-        *place += 1;
+    let mut order = vec![(0, 0); lists.iter().map(Vec::len).sum()];
+    for (number, list) in (0_u32..).zip(lists) {
+        for (at, placed) in (0_u32..).zip(list) {
+            let place = &mut before[(placed.first - least) as usize];
+            order[*place as usize] = (number, at);
+            *place += 1;
+        }
     }
-    order.into_par_iter().map(|at| placed[at].clone()).collect()
+    order.into_par_iter().map(|(number, at)| lists[number as usize][at as usize].clone()).collect()
 }
 
 /// Where a brick is; `None` off the image.
@@ -91,7 +99,7 @@ pub(super) fn place_box(
         let low = (bounds.low - half_box - 0.5)[axis].max(0.0);
         let high = (bounds.high + half_box - 0.5)[axis].min(f64::from(view.size[axis]) - 1.0);
         // Pixel centres are at whole numbers here.
-        (low <= high).then(|| [low as usize / side, high as usize / side])
+        (low <= high).then(|| [low, high].map(|pixel| (pixel as usize / side) as u16))
     };
     let (columns, rows) = (tiles(0, COLUMNS)?, tiles(1, ROWS)?);
     let Range { start: first, end } = projection.reached(&view.slabs.touched(start, end));
@@ -108,9 +116,15 @@ pub(super) fn place_box(
 pub(super) fn bin(placed: &[Placed], row: usize, columns: usize) -> Vec<Vec<u32>> {
     let mut tiles = vec![Vec::new(); columns];
     for (at, placed) in placed.iter().enumerate() {
-        if placed.rows[0] <= row && row <= placed.rows[1] {
-            tiles[placed.columns[0]..=placed.columns[1]].iter_mut().for_each(|tile| tile.push(at as u32));
+        if is_within(placed.rows, row) {
+            let [first, last] = placed.columns.map(usize::from);
+            tiles[first..=last].iter_mut().for_each(|tile| tile.push(at as u32));
         }
     }
     tiles
+}
+
+/// Whether a column or row of tiles is among those from a first to a last one.
+pub(super) fn is_within([first, last]: [u16; 2], at: usize) -> bool {
+    usize::from(first) <= at && at <= usize::from(last)
 }

@@ -246,9 +246,6 @@ impl<'a> Frame<'a> {
 fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overlaps {
     /// The bricks that a thread counts at a time.
     const AT_A_TIME: usize = 512;
-    if view.perspective.is_some() {
-        return Overlaps::count(bricks, view);
-    }
     let depths = PlaceDepths::new(view);
     let of_chunk = |bricks: &[Brick]| {
         dispatch!(level, simd => simd.vectorize(
@@ -256,7 +253,10 @@ fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overla
             || {
                 let mut sum = Overlaps::default();
                 for brick in bricks {
-                    sum = sum.and(depths.overlaps(brick));
+                    sum = sum.and(match view.perspective {
+                        None => depths.overlaps(brick),
+                        Some(_) => Overlaps::of_brick(brick, view),
+                    });
                 }
                 sum
             },

@@ -39,6 +39,7 @@ impl SlabGrid {
 
     /// The slabs that the depths from `first` to `end` overlap by more than rounding errors, so that a kernel that ends at a plane does not
     /// reach the slab behind it.
+    #[inline(always)]
     pub fn touched(&self, first: f64, end: f64) -> Range<i32> {
         let first = ((first - self.origin) / self.width + ROUNDING).floor();
         let end = ((end - self.origin) / self.width - ROUNDING).ceil();

@@ -230,6 +230,7 @@ impl ViewGeometry {
     }
 
     /// The slabs that a voxel's kernel overlaps; empty before the near plane.
+    #[inline(always)]
     pub fn touched(&self, voxel: UVec3) -> Range<i32> {
         let p = voxel.as_dvec3();
         let depth = self.screen_from_voxel[2].dot(p.extend(1.0));

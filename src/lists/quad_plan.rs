@@ -120,12 +120,20 @@ impl Overlaps {
             let depths = PlaceDepths::new(view);
             return bricks.map(|brick| depths.overlaps(brick)).reduce(Self::default, Self::and);
         }
-        bricks
-            .flat_map_iter(brick::voxels)
-            .map(|(_, voxel)| view.touched(voxel))
-            .filter(|slabs| !slabs.is_empty())
-            .map(|slabs| Self { voxels: 1, sections: slabs.len() as u64, slabs })
-            .reduce(Self::default, Self::and)
+        bricks.map(|brick| Self::of_brick(brick, view)).reduce(Self::default, Self::and)
+    }
+
+    /// Counts the overlaps of the voxels in a brick.
+    #[inline(always)]
+    pub fn of_brick(brick: &Brick, view: &ViewGeometry) -> Self {
+        let mut sum = Self::default();
+        for (_, voxel) in brick::voxels(brick) {
+            let slabs = view.touched(voxel);
+            if !slabs.is_empty() {
+                sum = sum.and(Self { voxels: 1, sections: slabs.len() as u64, slabs });
+            }
+        }
+        sum
     }
 
     /// The planes of values that voxels' kernels meet, where classification comes after splatting (SPEC §9), and the slabs that the cells

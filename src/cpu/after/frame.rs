@@ -16,7 +16,7 @@ use super::planes::Points;
 use super::slab_integral::Integrals;
 use super::tile::TileWalk;
 use crate::after::normalization::Normalization;
-use crate::cpu::bin::{Placed, by_first};
+use crate::cpu::bin::by_first;
 use crate::cpu::composite::Compositor;
 use crate::cpu::cut::{RayMode, TileRays};
 use crate::cpu::first_hit;
@@ -182,13 +182,12 @@ impl<'a> Frame<'a> {
     pub(in crate::cpu) fn draw(frames: &[Self], level: Level) -> Drawing {
         let first = &frames[0];
         let size = first.placement.view.size;
-        let place = |frame: &Self| frame.placement.place(&frame.matter.wanted(), |number| frame.matter.bounds(number));
-        let mut placed = place(first);
-        for frame in &frames[1..] {
-            let further = place(frame);
-            placed.extend(further.into_iter().map(|placed| Placed { channel: frame.channel, ..placed }));
-        }
-        let placed = by_first(placed);
+        let place = |frame: &Self| {
+            let mut placed = frame.placement.place(&frame.matter.wanted(), |number| frame.matter.bounds(number));
+            placed.iter_mut().for_each(|placed| placed.channel = frame.channel as u16);
+            placed
+        };
+        let placed = by_first(&frames.iter().map(place).collect::<Vec<_>>());
         let has_hits = first.compositor.first_hit.is_some();
         let has_extremes = first.resolver.is_none() && is_choice(first.compositing);
         let (content, first_hits, tally) = draw_tiles(

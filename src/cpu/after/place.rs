@@ -111,7 +111,7 @@ impl Placement {
             let tiles = |axis: usize, side: usize| {
                 let low = (low[axis] - 0.5).max(0.0);
                 let high = (high[axis] - 0.5).min(f64::from(self.view.size[axis]) - 1.0);
-                (low <= high).then(|| [low as usize / side, high as usize / side])
+                (low <= high).then(|| [low, high].map(|pixel| (pixel as usize / side) as u16))
             };
             let (columns, rows) = (tiles(0, COLUMNS)?, tiles(1, ROWS)?);
             let placed = Placed {
