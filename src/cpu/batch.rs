@@ -27,7 +27,6 @@ pub(super) struct AlongRay {
     end: i32,
     first_plane: f32,
     step: f32,
-    local: LocalFootprint,
 }
 
 impl Batch<'_> {
@@ -53,7 +52,7 @@ impl Batch<'_> {
     /// The sections of a voxel without perspective.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn flat(&self, (first_plane, end): (f32, i32)) -> AlongRay {
-        AlongRay { end, first_plane, step: self.flat_step, local: LocalFootprint::default() }
+        AlongRay { end, first_plane, step: self.flat_step }
     }
 
     /// The sections of a voxel in perspective, the next one of the batch.
@@ -62,7 +61,7 @@ impl Batch<'_> {
         let Some(perspective) = &projection.view.perspective else { return AlongRay::default() };
         let lens = projection.lens(perspective, place, voxel);
         self.set_view(self.count, projection, &lens, frame.amplitude);
-        let local = lens.local.map_or_else(LocalFootprint::default, |local| LocalFootprint {
+        self.splats[self.count].local = lens.local.map_or_else(LocalFootprint::default, |local| LocalFootprint {
             axis: local.axis.to_array().map(|component| component as f32),
             metric: local.metric.to_array().map(|component| component as f32),
             depth_per_warped: local.depth_per_warped as f32,
@@ -73,20 +72,23 @@ impl Batch<'_> {
             end: projection.sheets(place, voxel).end,
             first_plane: ((projection.plane_before(sheet) - place.depth) * lens.per_slab) as f32,
             step: (f64::from(projection.direction) * lens.per_slab) as f32,
-            local,
         }
     }
 
+    /// Adds a voxel; in perspective that of the last [`Self::lens`].
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn add(
         &mut self,
         voxel: [u32; 2],
         sheet: i32,
-        AlongRay { end, first_plane, step, local }: AlongRay,
+        AlongRay { end, first_plane, step }: AlongRay,
         (center, pixels): ([f32; 2], Pixels),
     ) {
-        self.splats[self.count] =
-            Splat { center, pixels, amount: [0.0; 4], sheets: [sheet, end], first_plane, step, voxel, drawn: 0, local };
+        // Its amount is not known yet.
+        let splat = &mut self.splats[self.count];
+        (splat.center, splat.pixels, splat.sheets) = (center, pixels, [sheet, end]);
+        (splat.first_plane, splat.step) = (first_plane, step);
+        (splat.voxel, splat.drawn) = (voxel, 0);
         self.count += 1;
     }
 }
