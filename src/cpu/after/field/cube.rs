@@ -2,7 +2,7 @@
 //! x and y, so that the volume is read in runs of four.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x4, f32x8, f32x16};
+use fearless_simd::{f32x4, f32x8, f32x16, u8x64};
 use glam::UVec3;
 
 use super::{Cube, Field};
@@ -38,8 +38,7 @@ impl<S: Simd> Weights<S> {
         let x = f32x16::splat(simd, x) - f32x16::load_array(simd, to_x);
         let y = f32x16::splat(simd, y) - f32x16::load_array(simd, to_y);
         let squared = x * x + y * y;
-        let (low, high) = (squared * field.exponent).split();
-        let in_plane = gaussian(simd, low).combine(gaussian(simd, high));
+        let in_plane = gaussian(simd, squared * field.exponent);
         let z = f32x8::splat(simd, z) - f32x8::load_array(simd, [0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
         let z_squared = z * z;
         let first = |vector: f32x8<S>| {
@@ -64,22 +63,31 @@ impl<S: Simd> Weights<S> {
     }
 }
 
-/// The kernels around a point, without what depends on x, for each row of voxels along x: `g = along·across`, cut off at the radius.
+/// The kernels around a point, for each row of voxels along x: `g = along·across`, cut off at the radius.
 struct RowWeights {
+    /// The Gaussian of δ along x, and its square.
+    along: [f32; SIDE],
+    squared: [f32; SIDE],
+    /// By row: the Gaussian of the other components, and the square of the component along x at the kernel's radius.
     across: [f32; SIDE * SIDE],
-    /// The square of the component of δ along x at the kernel's radius.
     limits: [f32; SIDE * SIDE],
 }
 
 impl RowWeights {
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn new<S: Simd>(simd: S, field: &Field<'_>, [_, y, z]: [f32; 3]) -> Self {
-        let offset = f32x8::load_array(simd, [y, y - 1.0, y - 2.0, y - 3.0, z, z - 1.0, z - 2.0, z - 3.0]);
+    fn new<S: Simd>(simd: S, field: &Field<'_>, [x, y, z]: [f32; 3]) -> Self {
+        /// The voxels of an axis, for each of three axes.
+        const VOXELS: [f32; 4 * SIDE] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0];
+        let (x, y, z) = (f32x4::splat(simd, x), f32x4::splat(simd, y), f32x4::splat(simd, z));
+        let offset = x.combine(y).combine(z.combine(z)) - f32x16::load_array(simd, VOXELS);
         let squared = offset * offset;
-        let (of_y, of_z) = gaussian(simd, squared * field.exponent).split();
-        let (y_squared, z_squared) = squared.split();
+        let (of_xy, of_z) = gaussian(simd, squared * field.exponent).split();
+        let (xy_squared, z_squared) = squared.split();
+        let ((of_x, of_y), (of_z, _)) = (of_xy.split(), of_z.split());
+        let ((x_squared, y_squared), (z_squared, _)) = (xy_squared.split(), z_squared.split());
         let (of_z, left) = (of_z.to_array(), (f32x4::splat(simd, field.radius_squared) - z_squared).to_array());
-        let mut rows = Self { across: [0.0; SIDE * SIDE], limits: [0.0; SIDE * SIDE] };
+        let (along, squared) = (of_x.to_array(), x_squared.to_array());
+        let mut rows = Self { along, squared, across: [0.0; SIDE * SIDE], limits: [0.0; SIDE * SIDE] };
         let (across, limits) = (rows.across.as_chunks_mut::<SIDE>().0, rows.limits.as_chunks_mut::<SIDE>().0);
         for z in 0..SIDE {
             (of_y * of_z[z]).store_array(&mut across[z]);
@@ -123,11 +131,7 @@ impl Field<'_> {
     /// N and `2·Σ d·g`, of differences that are kept: x, y and z of a row's four voxels side by side.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn kept_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights, kept: &Differences) -> [f32; 4] {
-        const VOXELS: [f32; 16] = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0, 3.0];
-        let x = f32x16::splat(simd, cube.rest[0]) - f32x16::load_array(simd, VOXELS);
-        let squared = x * x;
-        let (low, high) = (squared * self.exponent).split();
-        let along = gaussian(simd, low).combine(gaussian(simd, high));
+        let (along, squared) = (by_difference(simd, rows.along), by_difference(simd, rows.squared));
         let zero = f32x16::splat(simd, 0.0);
         let (mut total, mut sums) = (zero, zero);
         for (row, index) in self.rows_of(cube).enumerate() {
@@ -147,10 +151,7 @@ impl Field<'_> {
         let (values, dims, [step_y, step_z]) = (self.volume.values(), self.extent.dims, self.steps());
         let is_inside = cube.first.cmpgt(UVec3::ZERO).all() && (cube.first + SIDE as u32).cmplt(dims).all();
         let neighbours = Neighbours::of(values, dims, [1, step_y, step_z]);
-        let x = f32x4::splat(simd, cube.rest[0]) - f32x4::load_array(simd, [0.0, 1.0, 2.0, 3.0]);
-        let squared = x * x;
-        let exponents = squared * self.exponent;
-        let (along, _) = gaussian(simd, exponents.combine(exponents)).split();
+        let (along, squared) = (f32x4::load_array(simd, rows.along), f32x4::load_array(simd, rows.squared));
         let zero = f32x4::splat(simd, 0.0);
         let four = |at: usize| f32x4::load_array(simd, values.run(at));
         let [mut total, mut x, mut y, mut z] = [zero; 4];
@@ -214,10 +215,28 @@ impl Field<'_> {
     }
 }
 
+/// The number of each of a row's four voxels for each of their three differences.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn by_difference<S: Simd>(simd: S, of_voxels: [f32; SIDE]) -> f32x16<S> {
+    const BYTES: [u8; 64] = {
+        let mut bytes = [0; 64];
+        let mut at = 0;
+        while at < 64 {
+            let voxel = if at / 12 < SIDE { at / 12 } else { SIDE - 1 };
+            bytes[at] = (voxel * 4 + at % 4) as u8;
+            at += 1;
+        }
+        bytes
+    };
+    let four = f32x4::load_array(simd, of_voxels);
+    let eight = four.combine(four);
+    eight.combine(eight).swizzle_dyn_within_blocks(u8x64::load_array_ref(simd, &BYTES))
+}
+
 /// The Gaussian by its exponent of 2.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn gaussian<S: Simd>(simd: S, exponent: f32x8<S>) -> f32x8<S> {
-    exp2(simd, exponent.max(f32x8::splat(simd, -126.0)))
+fn gaussian<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, exponent: V) -> V {
+    exp2(simd, exponent.max(V::splat(simd, -126.0)))
 }
 
 /// Four rows of four voxels, given the index of the first one and the step from row to row.
