@@ -7,7 +7,7 @@ use super::cull::{OpenMask, Pixels};
 use super::sheets::{COLUMNS, ROWS};
 use super::vector::LANES;
 
-/// The pixels of the largest vector.
+/// The pixels of the largest vector: two rows of eight.
 pub(super) const WIDEST: usize = 2 * LANES;
 
 /// The pixels from which on a list is full.
@@ -60,10 +60,15 @@ impl Reached {
             let mut row = first;
             while row <= last {
                 let (is_reached, numbers) = footprint([dx, rows - center[1]]);
-                let is_open = (0..down).fold(0, |bits, next| bits | open.bits(row + next, column, across) << (next * across));
-                let bits = is_reached.to_bitmask() & is_open;
+                let mut bits = 0;
+                for next in 0..down {
+                    bits |= open.bits(row + next, column, across) << (next * across);
+                }
+                bits &= is_reached.to_bitmask();
                 let listed = V::Mask::from_bitmask(simd, bits);
-                indices.compress(<V::Bits as SimdBase<S>>::Mask::from_bitmask(simd, bits)).store_slice(&mut list[count..count + V::LEN]);
+                indices
+                    .compress(<V::Bits as SimdBase<S>>::Mask::from_bitmask(simd, bits))
+                    .store_slice(&mut list[count..count + V::LEN]);
                 for (list, numbers) in lists.iter_mut().zip(&numbers) {
                     numbers.compress(listed).store_slice(&mut list[count..count + V::LEN]);
                 }
@@ -78,25 +83,9 @@ impl Reached {
     }
 }
 
-/// For each pixel of the largest vector its column and row, counted from the first one, and its index in a tile.
-const COLUMN: [f32; WIDEST] = {
-    let mut all = [0.0; WIDEST];
-    let mut at = 0;
-    while at < WIDEST {
-        all[at] = (at % LANES) as f32;
-        at += 1;
-    }
-    all
-};
-const ROW: [f32; WIDEST] = {
-    let mut all = [0.0; WIDEST];
-    let mut at = 0;
-    while at < WIDEST {
-        all[at] = (at / LANES) as f32;
-        at += 1;
-    }
-    all
-};
+/// The columns of a vector's pixels, counted from the first one, their rows, and their indices in a tile: in rows of eight.
+const COLUMN: [f32; WIDEST] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
+const ROW: [f32; WIDEST] = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0];
 const INDEX: [u32; WIDEST] = {
     let mut all = [0; WIDEST];
     let mut at = 0;
@@ -106,3 +95,73 @@ const INDEX: [u32; WIDEST] = {
     }
     all
 };
+
+#[cfg(test)]
+mod tests {
+    use fearless_simd::{Level, Simd, dispatch};
+
+    use super::*;
+    use crate::cpu::simd::Simd as InstructionSet;
+
+    /// ρ² of an offset.
+    fn squared(dx: f32, dy: f32) -> f32 {
+        dx * dx + dy * dy * 1.3
+    }
+
+    /// Lists a footprint whose ρ² is below a limit.
+    fn list<S: Simd>(
+        simd: S,
+        (center, limit): ([f32; 2], f32),
+        pixels: &Pixels,
+        open: &OpenMask,
+        reached: &mut Reached,
+    ) {
+        reached.list(simd, center, pixels, open, |[dx, dy]: [S::f32s; 2]| {
+            let rho_squared = dx * dx + dy * dy * 1.3;
+            (rho_squared.simd_lt(S::f32s::splat(simd, limit)), [rho_squared])
+        });
+    }
+
+    /// Every instruction set lists the pixels that are open and reached, each once, with numbers of the same bits, whatever its vectors cover.
+    #[test]
+    fn pixels_are_listed_that_are_open_and_reached() {
+        let mut open = OpenMask::new(COLUMNS - 1, ROWS - 2);
+        (0..ROWS).for_each(|row| open.close(row, 0x8421_0401_u32.rotate_left(row as u32 * 7)));
+        open.join();
+        let footprints: [([f32; 2], f32); 7] = [
+            ([10.3, 20.7], 9.0),
+            ([0.013, 0.37], 12.5),
+            ([-1.7, 63.2], 30.0),
+            ([31.4, 60.9], 6.0),
+            ([33.0, -2.5], 50.0),
+            ([16.0, 31.0], 1e4),
+            ([5.5, 5.5], 0.1),
+        ];
+        let levels =
+            InstructionSet::available().into_iter().map(|set| set.checked().ok()).collect::<Option<Vec<Level>>>();
+        for level in levels.into_iter().flatten() {
+            for pair in footprints.windows(2) {
+                let (mut reached, mut expected) = (Reached::new(), Vec::new());
+                for &(center, limit) in pair {
+                    let half = [limit.sqrt() + 0.01; 2];
+                    let Some(pixels) = Pixels::within(center, half) else { continue };
+                    dispatch!(level, simd => list(simd, (center, limit), &pixels, &open, &mut reached));
+                    let all = (0..ROWS).flat_map(|row| (0..COLUMNS).map(move |column| (row, column)));
+                    let seen = all.filter(|&(row, column)| open.row(row) >> column & 1 == 1);
+                    let listed = seen.filter_map(|(row, column)| {
+                        let number = squared(column as f32 - center[0], row as f32 - center[1]);
+                        (number < limit).then_some(((row * COLUMNS + column) as u32, number.to_bits()))
+                    });
+                    let first = expected.len();
+                    expected.extend(listed);
+                    let pixels = reached.pixels[first..reached.count].iter();
+                    let numbers = reached.numbers[0][first..reached.count].iter().map(|number| number.to_bits());
+                    let mut of_footprint: Vec<(u32, u32)> = pixels.copied().zip(numbers).collect();
+                    of_footprint.sort_unstable();
+                    assert_eq!(of_footprint, expected[first..], "{level:?} {center:?}");
+                }
+                assert!(reached.count == expected.len());
+            }
+        }
+    }
+}

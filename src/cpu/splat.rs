@@ -264,11 +264,8 @@ impl Splatter {
         let width = (one / along * x + one / across * y).sqrt() * self.kernel.support;
         let height = (one / along * y + one / across * x).sqrt() * self.kernel.support;
         footprint.set_planes(simd, &self.kernel, [near, far]);
-        footprint.local = LocalSections {
-            along: along.to_array(),
-            across: across.to_array(),
-            amplitude: amplitude.to_array(),
-        };
+        footprint.local =
+            LocalSections { along: along.to_array(), across: across.to_array(), amplitude: amplitude.to_array() };
         // The box contains the footprint whatever is rounded, so that the footprint alone decides, and not the vectors that cover the box.
         let half_box = [width.reduce_max(), height.reduce_max()].map(|half| half * (1.0 + RELATIVE_SLACK) + SLACK);
         Pixels::within(splat.center, half_box)

@@ -77,7 +77,8 @@ impl RowWeights {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn new<S: Simd>(simd: S, field: &Field<'_>, [x, y, z]: [f32; 3]) -> Self {
         /// The voxels of an axis, for each of three axes.
-        const VOXELS: [f32; 4 * SIDE] = [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0];
+        const VOXELS: [f32; 4 * SIDE] =
+            [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0];
         let (x, y, z) = (f32x4::splat(simd, x), f32x4::splat(simd, y), f32x4::splat(simd, z));
         let offset = x.combine(y).combine(z.combine(z)) - f32x16::load_array(simd, VOXELS);
         let squared = offset * offset;
