@@ -112,14 +112,22 @@ pub(super) fn place_box(
     Some(Placed { brick: number, channel: 0, first, end, half_box, middle, half, columns, rows })
 }
 
-/// The bricks of every tile of a row of tiles, as indices into the list of placed bricks.
-pub(super) fn bin(placed: &[Placed], row: usize, columns: usize) -> Vec<Vec<u32>> {
+/// The bricks of each of some rows of tiles, as indices into the list of placed bricks.
+pub(super) fn by_row(placed: &[Placed], rows: usize) -> Vec<Vec<u32>> {
+    let mut by_row = vec![Vec::new(); rows];
+    for (at, placed) in (0_u32..).zip(placed) {
+        let [first, last] = placed.rows.map(usize::from);
+        by_row.iter_mut().take(last + 1).skip(first).for_each(|row| row.push(at));
+    }
+    by_row
+}
+
+/// The bricks of every tile of a row of tiles, given those of the row.
+pub(super) fn by_tile(placed: &[Placed], of_row: &[u32], columns: usize) -> Vec<Vec<u32>> {
     let mut tiles = vec![Vec::new(); columns];
-    for (at, placed) in placed.iter().enumerate() {
-        if is_within(placed.rows, row) {
-            let [first, last] = placed.columns.map(usize::from);
-            tiles[first..=last].iter_mut().for_each(|tile| tile.push(at as u32));
-        }
+    for &at in of_row {
+        let [first, last] = placed[at as usize].columns.map(usize::from);
+        tiles[first..=last].iter_mut().for_each(|tile| tile.push(at));
     }
     tiles
 }

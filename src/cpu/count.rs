@@ -3,6 +3,7 @@
 use std::ops::AddAssign;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::queue::BySlot;
 use super::sheets::SECTIONS;
 use crate::geometry::view_geometry::ViewGeometry;
 
@@ -41,8 +42,8 @@ impl Drawn {
         Self { marks: (0..bricks * masks).map(|_| AtomicU64::new(0)).collect(), masks }
     }
 
-    /// Adds what a tile has marked of a brick. `sheets` tells how many a voxel has, given its slot.
-    pub(super) fn add(&self, brick: u32, marks: &[u64], sheets: impl Fn(u32) -> u64, tally: &mut Tally) {
+    /// Adds what a tile has marked of a brick, given how many sections its voxels have.
+    pub(super) fn add(&self, brick: u32, marks: &[u64], sections: &BySlot<u32>, tally: &mut Tally) {
         let all = &self.marks[brick as usize * self.masks..][..self.masks];
         for (mask, (all, &marks)) in all.iter().zip(marks).enumerate() {
             if marks == 0 {
@@ -53,9 +54,9 @@ impl Drawn {
                 tally.voxels_shaded += u64::from(new.count_ones());
                 continue;
             }
-            let before = (mask - 1) as u64 * SECTIONS as u64;
-            let of_voxel = |slot| sheets(slot).saturating_sub(before).min(SECTIONS as u64);
-            tally.sections += bits(new).map(of_voxel).sum::<u64>();
+            let before = (mask - 1) as u32 * SECTIONS as u32;
+            let of_voxel = |slot: u32| sections[slot as usize].saturating_sub(before).min(SECTIONS as u32);
+            tally.sections += bits(new).map(|slot| u64::from(of_voxel(slot))).sum::<u64>();
         }
     }
 }

@@ -300,9 +300,10 @@ pub(super) fn draw_tiles<W>(
     let others = strips(&mut extremes, region).into_iter().zip(strips(&mut first_hits, region));
     let strips: Vec<_> = strips(&mut colors, region).into_iter().zip(others).collect();
     let first_row = region.rows().start / ROWS;
+    let by_row = bin::by_row(placed, first_row + strips.len());
     let tally = strips.into_par_iter().enumerate().map(|(at, (colors, (extremes, hits)))| {
         let row = first_row + at;
-        let bins = bin::bin(placed, row, columns);
+        let bins = bin::by_tile(placed, &by_row[row], columns);
         let tiles = bins[drawn.clone()]
             .par_iter()
             .zip(drawn.clone())

@@ -211,6 +211,25 @@ impl Projection {
         first
     }
 
+    /// The number of sheets that each of a brick's voxels overlaps, by slot; of empty slots any number.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn sections(&self, brick: &Brick, place: Place) -> BySlot<u32> {
+        let mut sections = [0; BRICK_VOXELS as usize];
+        if self.view.perspective.is_some() {
+            for (slot, voxel) in brick::voxels(brick) {
+                sections[slot as usize] = self.sheets(self.of_voxel(place, slot), voxel).len() as u32;
+            }
+            return sections;
+        }
+        let reach = self.view.reach / self.view.slabs.width;
+        for (sections, offset) in sections.iter_mut().zip(&self.offsets.depth) {
+            let depth = place.depth + offset;
+            let Range { start, end } = self.numbered(depth - reach, depth + reach);
+            *sections = end.saturating_sub(start).max(0) as u32;
+        }
+        sections
+    }
+
     /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets, up to the last that is composited; none if they end
     /// before the first.
     #[cfg_attr(not(debug_assertions), inline(always))]

@@ -125,7 +125,7 @@ impl<'a> TileWalk<'a> {
         if let Some(first) = first {
             self.walk(simd, first, &mut bricks);
         }
-        self.leave(i32::MAX);
+        self.leave(simd, i32::MAX);
         (&self.buffers, &self.rays, self.tally)
     }
 
@@ -189,7 +189,7 @@ impl<'a> TileWalk<'a> {
                 _ => sheet + 1,
             };
             if matches!(self.frame.voxels, Voxels::Streamed(_)) && sheet % RING as i32 == 0 {
-                self.leave(sheet);
+                self.leave(simd, sheet);
             }
         }
     }
@@ -241,20 +241,20 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Adds what was drawn of bricks whose last sheet is before this one to the counts, and lets go of their chunks.
-    fn leave(&mut self, sheet: i32) {
+    fn leave<S: Simd>(&mut self, simd: S, sheet: i32) {
         let Self { frame, arrived, marks, tally, .. } = self;
         for (arrived, marks) in arrived.iter_mut().zip(marks.chunks_mut(frame.drawn.masks)) {
             let Arrived { number, brick, place, end, .. } = *arrived;
             if end > sheet || marks[0] == 0 && arrived.chunk.is_none() {
                 continue;
             }
-            let sheets = |slot| {
-                let place = frame.projection.of_voxel(place, slot);
-                frame.projection.sheets(place, brick::origin(&brick) + brick::in_brick(slot)).len() as u64
-            };
+            let sections = simd.vectorize(
+                #[cfg_attr(not(debug_assertions), inline(always))]
+                || frame.projection.sections(&brick, place),
+            );
             let chunk = arrived.chunk.take();
             let drawn = chunk.as_ref().map_or(&frame.drawn, |chunk| &**chunk.drawn());
-            drawn.add(number, marks, sheets, tally);
+            drawn.add(number, marks, &sections, tally);
             marks.fill(0);
         }
     }
