@@ -20,7 +20,7 @@ pub(super) struct Placed {
     /// Its number in the list of bricks.
     pub(super) brick: u32,
     /// The channel whose brick it is, where each has bricks of its own.
-    pub(super) channel: u16,
+    pub(super) channel: u32,
     /// The first sheet that its kernels may reach.
     pub(super) first: i32,
     /// The sheet behind the last one.
@@ -130,9 +130,4 @@ pub(super) fn by_tile(placed: &[Placed], of_row: &[u32], columns: usize) -> Vec<
         tiles[first..=last].iter_mut().for_each(|tile| tile.push(at));
     }
     tiles
-}
-
-/// Whether a column or row of tiles is among those from a first to a last one.
-pub(super) fn is_within([first, last]: [u16; 2], at: usize) -> bool {
-    usize::from(first) <= at && at <= usize::from(last)
 }

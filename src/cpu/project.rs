@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, UVec3};
 
+use super::count::bits;
 use super::queue::{BySlot, NO_SHEET};
 use crate::geometry::slab;
 use crate::geometry::view_geometry::{Perspective, ViewGeometry};
@@ -211,16 +212,18 @@ impl Projection {
         first
     }
 
-    /// The number of sheets that each of a brick's voxels overlaps, by slot; of empty slots any number.
+    /// The number of sheets that each of some of a brick's voxels overlaps, by slot; of other slots any number.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn sections(&self, brick: &Brick, place: Place) -> BySlot<u32> {
+    pub(super) fn sections(&self, brick: &Brick, place: Place, voxels: u64) -> BySlot<u32> {
         let mut sections = [0; BRICK_VOXELS as usize];
         if self.view.perspective.is_some() {
-            for (slot, voxel) in brick::voxels(brick) {
+            for slot in bits(voxels) {
+                let voxel = brick::origin(brick) + brick::in_brick(slot);
                 sections[slot as usize] = self.sheets(self.of_voxel(place, slot), voxel).len() as u32;
             }
             return sections;
         }
+        // All slots, without a branch, so that the loop is vectorized.
         let reach = self.view.reach / self.view.slabs.width;
         for (sections, offset) in sections.iter_mut().zip(&self.offsets.depth) {
             let depth = place.depth + offset;

@@ -128,15 +128,15 @@ mod tests {
         let mut open = OpenMask::new(COLUMNS - 1, ROWS - 2);
         (0..ROWS).for_each(|row| open.close(row, 0x8421_0401_u32.rotate_left(row as u32 * 7)));
         open.join();
-        let footprints: [([f32; 2], f32); 7] = [
-            ([10.3, 20.7], 9.0),
-            ([0.013, 0.37], 12.5),
-            ([-1.7, 63.2], 30.0),
-            ([31.4, 60.9], 6.0),
-            ([33.0, -2.5], 50.0),
-            ([16.0, 31.0], 1e4),
-            ([5.5, 5.5], 0.1),
-        ];
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(747_796_405).wrapping_add(2_891_336_453);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        // Near the tile's first pixel offsets from a centre are rounded.
+        let mut footprints: Vec<([f32; 2], f32)> =
+            (0..300).map(|_| ([0.7 * random() - 0.3, 70.0 * random() - 3.0], 40.0 * random())).collect();
+        footprints.extend([([33.0, -2.5], 50.0), ([5.5, 5.5], 0.1), ([16.0, 31.0], 1e4)]);
         let levels =
             InstructionSet::available().into_iter().map(|set| set.checked().ok()).collect::<Option<Vec<Level>>>();
         for level in levels.into_iter().flatten() {

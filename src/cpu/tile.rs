@@ -172,6 +172,7 @@ impl<'a> TileWalk<'a> {
                 }
             }
             self.start(simd, sheet);
+            self.add_footprints(simd);
             if !self.frame.is_each {
                 self.composite(simd, sheet);
             }
@@ -250,7 +251,7 @@ impl<'a> TileWalk<'a> {
             }
             let sections = simd.vectorize(
                 #[cfg_attr(not(debug_assertions), inline(always))]
-                || frame.projection.sections(&brick, place),
+                || frame.projection.sections(&brick, place, marks[0]),
             );
             let chunk = arrived.chunk.take();
             let drawn = chunk.as_ref().map_or(&frame.drawn, |chunk| &**chunk.drawn());
@@ -291,18 +292,15 @@ impl<'a> TileWalk<'a> {
         sees(&self.open, self.origin, placed)
     }
 
-    /// Draws the voxels that start or continue in a sheet.
+    /// Lists the pixels of voxels that start or continue in a sheet.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn start<S: Simd>(&mut self, simd: S, sheet: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(sheet)]);
         self.pending -= continued.len();
         for splat in &continued {
-            self.draw_splat(simd, splat);
+            self.list_splat(simd, splat);
         }
-        let Some(mut starting) = self.queue.advance() else {
-            self.add_footprints(simd);
-            return;
-        };
+        let Some(mut starting) = self.queue.advance() else { return };
         if self.frame.is_each {
             starting = self.sorted_by_depth(&starting);
         }
@@ -320,7 +318,6 @@ impl<'a> TileWalk<'a> {
         }
         self.start_voxels(simd, &mut starts, sheet, &mut batch);
         self.draw_batch(simd, &mut batch);
-        self.add_footprints(simd);
         self.queue.reuse(starting);
     }
 
@@ -401,14 +398,14 @@ impl<'a> TileWalk<'a> {
                 for (lane, splat) in batch.splats[..count].iter_mut().enumerate() {
                     let [red, green, blue, amount] = &amounts;
                     splat.amount = [red[lane], green[lane], blue[lane], amount[lane]];
-                    self.draw_splat(simd, splat);
+                    self.list_splat(simd, splat);
                 }
             },
         );
     }
 
     /// Lists the pixels of a voxel's next sections, if they are seen, and keeps the voxel if it has more.
-    fn draw_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
+    fn list_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]

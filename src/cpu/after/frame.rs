@@ -184,7 +184,7 @@ impl<'a> Frame<'a> {
         let size = first.placement.view.size;
         let place = |frame: &Self| {
             let mut placed = frame.placement.place(&frame.matter.wanted(), |number| frame.matter.bounds(number));
-            placed.iter_mut().for_each(|placed| placed.channel = frame.channel as u16);
+            placed.iter_mut().for_each(|placed| placed.channel = frame.channel as u32);
             placed
         };
         let placed = by_first(&frames.iter().map(place).collect::<Vec<_>>());

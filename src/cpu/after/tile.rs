@@ -149,7 +149,7 @@ impl<'a> TileWalk<'a> {
         let Frame { placement, matter, .. } = self.frame;
         let (bounds, slabs) = placement.bounds(matter.bounds(placed.brick));
         if let Some(pixels) = pixels_of(self.origin, bounds).filter(|pixels| self.open.sees(pixels)) {
-            let Channel { frame, active, .. } = &mut self.channels[usize::from(placed.channel)];
+            let Channel { frame, active, .. } = &mut self.channels[placed.channel as usize];
             active.push((slabs.end, pixels));
             frame.draw_brick(placed.brick);
             self.tally.bricks_visited += 1;

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::UVec3;
 
 use super::source::{Source, Splats};
-use crate::cpu::bin::{Placed, is_within, place_brick};
+use crate::cpu::bin::{Placed, place_brick};
 use crate::cpu::count::Drawn;
 use crate::lists::brick::{self, Brick, BrickList};
 use crate::lists::classify::TakingPart;
@@ -109,7 +109,8 @@ impl Chunk {
 
     /// The bricks that a tile, given by its column and row, may show, by their places in the order of arrival.
     pub(in crate::cpu) fn bricks_of(&self, [column, row]: [usize; 2]) -> impl Iterator<Item = u32> {
-        let is_there = move |placed: &Placed| is_within(placed.columns, column) && is_within(placed.rows, row);
+        let contains = |[first, last]: [u16; 2], at: usize| (usize::from(first)..=usize::from(last)).contains(&at);
+        let is_there = move |placed: &Placed| contains(placed.columns, column) && contains(placed.rows, row);
         (0..).zip(&self.placed).filter(move |(_, placed)| is_there(placed)).map(|(at, _)| at)
     }
 
