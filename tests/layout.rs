@@ -168,7 +168,7 @@ fn shared() -> [Layout; 17] {
             search_passes,
             hits
         }),
-        layout!(PatchRange { first_row, first_patch, end_patch }),
+        layout!(PatchRange { first_row, first_patch, end_patch, row_step }),
         layout!(Gathered { tally, words }).goes_on(),
     ]
 }

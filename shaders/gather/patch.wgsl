@@ -255,10 +255,15 @@ fn brick_count(patch_number: u32, first: u32, end: u32) -> u32 {
     return bins[bin + end] - bins[bin + first];
 }
 
+// The number of patches along a row.
+fn patch_columns() -> u32 {
+    return (frame.size.x + PATCH_WIDTH - 1u) / PATCH_WIDTH;
+}
+
 // Draws a patch's groups in compositing order, from where the previous dispatch stopped, until all pixels are opaque.
 fn draw(number: u32, first_thread: u32, thread: u32) {
     hold_ramps();
-    let columns = (frame.size.x + PATCH_WIDTH - 1u) / PATCH_WIDTH;
+    let columns = patch_columns();
     let corner = vec2u(number % columns, number / columns) * vec2u(PATCH_WIDTH, PATCH_HEIGHT);
     first_px = vec2f(corner) + 0.5;
     empty_queue(thread);
@@ -292,6 +297,14 @@ fn draw(number: u32, first_thread: u32, thread: u32) {
     finish(at, reached);
 }
 
+// The patch of the range that a workgroup draws, counted from the first. A software driver gives each thread one stretch of all workgroups, so that rows of
+// patches far from each other follow one another, and every stretch has about as much to draw.
+fn interleaved(at: u32) -> u32 {
+    let columns = patch_columns();
+    let rows = (patch_range.end_patch - patch_range.first_patch) / columns;
+    return at / columns * patch_range.row_step % rows * columns + at % columns;
+}
+
 @compute @workgroup_size(THREADS)
 fn main(
     @builtin(local_invocation_index) thread: u32,
@@ -305,10 +318,11 @@ fn main(
     start(workgroup.z);
     gather = gathers[zero];
     let at_workgroup = unfold(workgroup);
-    let number = patch_range.first_patch + at_workgroup / WORKGROUPS_PER_PATCH;
+    let at_patch = at_workgroup / WORKGROUPS_PER_PATCH;
+    let number = patch_range.first_patch + interleaved(at_patch);
     let first_thread = at_workgroup % WORKGROUPS_PER_PATCH * (PATCH_THREADS / WORKGROUPS_PER_PATCH);
     var is_left = false;
-    if number < patch_range.end_patch {
+    if at_patch < patch_range.end_patch - patch_range.first_patch {
         let half = firstTrailingBit(halves_of(first_thread + thread));
         let at = atomicLoad(&gathered.words[gather.reached + number * HALVES + half]);
         // Some modes count empty groups too, even behind the last brick of the patch.

@@ -30,6 +30,7 @@ struct PatchRange {
     first_row: u32,
     first_patch: u32,
     end_patch: u32,
+    row_step: u32,
 }
 
 struct Gathered {

@@ -374,6 +374,8 @@ pub struct PatchRange {
     pub first_patch: u32,
     /// The patch after the last.
     pub end_patch: u32,
+    /// The number of rows of patches from one that is drawn to the next, counted around the end: one that has no factor in common with the number of rows.
+    pub row_step: u32,
 }
 
 /// The tile rasterizer's results; [`GatheredLayout`](super::gathered_layout::GatheredLayout) is their layout in the words.

@@ -4,6 +4,7 @@
 pub(crate) mod carried;
 pub(crate) mod fields;
 pub(crate) mod kind;
+mod patch_ranges;
 pub(crate) mod quads;
 pub(crate) mod request;
 pub(crate) mod samples;

@@ -6,6 +6,7 @@ use bytemuck::Zeroable;
 use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits, TextureView};
 
 use super::carried::Carried;
+use super::patch_ranges::{Dispatch, patch_ranges, range_stride};
 use super::{FrameEstimate, FrameInputs, Prepared};
 use crate::error::RenderError;
 use crate::geometry::plane_geometry::PlaneGeometry;
@@ -14,12 +15,12 @@ use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, 
 use crate::gpu::brick_lists::BrickLists;
 use crate::gpu::counts::GroupSlabs;
 use crate::gpu::gathered_layout::GatheredLayout;
-use crate::gpu::layout::{Brick, FieldPlanes, Gather as GatherUniform, PatchRange};
+use crate::gpu::layout::{Brick, FieldPlanes, Gather as GatherUniform};
 use crate::gpu::targets::BandBuffer;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::lists::brick_union;
-use crate::lists::patch_bins::{self, PatchBins, SHEETS, Work};
+use crate::lists::patch_bins::{PatchBins, SHEETS, Work};
 use crate::pass::gather::{
     Gather, GatherBand, GatherBuffers, GatherMode, GatheredPlanes, MOST_LAYERS, PlaneMode, drawn_order,
     min_workgroup_bytes,
@@ -40,8 +41,7 @@ pub(crate) struct TileFrame {
     binned: Binned,
     buffers: TileBuffers<Buffer>,
     results: GatheredLayout,
-    /// For every dispatch its band's index, and the offset and number of its patches.
-    dispatches: Vec<(usize, u32, u32)>,
+    dispatches: Vec<Dispatch>,
     bands: Vec<GatherBand>,
     /// If values are gathered on planes.
     carried: Option<Carried>,
@@ -169,7 +169,7 @@ impl TileRasterizer {
         frame.carried.iter().for_each(|carried| carried.clear(encoder));
         frame.bands.iter().for_each(|band| band.clear(encoder));
         let mut pass = encoder.begin_compute_pass(&super::compute("sheetsplat.gather", timer, "gather"));
-        for &(band, offset, patches) in &frame.dispatches {
+        for &Dispatch { band, offset, patches } in &frame.dispatches {
             self.gather.record(&mut pass, &frame.bands[band], offset, patches);
         }
     }
@@ -389,27 +389,6 @@ const PLANES_BYTES: u64 = (MOST_LAYERS * size_of::<FieldPlanes>()) as u64;
 /// The maximum size of a storage binding in bytes.
 fn binding(limits: &Limits) -> u64 {
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
-}
-
-/// The patches of every band of the compositing buffer, as uniforms, and the frame's dispatches.
-fn patch_ranges(limits: &Limits, request: &FrameRequest) -> (Vec<u8>, Vec<(usize, u32, u32)>) {
-    let stride = range_stride(limits);
-    let (mut bytes, mut dispatches) = (Vec::new(), Vec::new());
-    let [columns, _] = patch_bins::grid(request.view.size);
-    for (at, band) in request.bands.iter().enumerate() {
-        let first_patch = band.first_row / patch_bins::PATCH[1] * columns;
-        let patches = band.rows.div_ceil(patch_bins::PATCH[1]) * columns;
-        let range = PatchRange { first_row: band.first_row, first_patch, end_patch: first_patch + patches };
-        dispatches.push((at, bytes.len() as u32, patches));
-        bytes.extend_from_slice(bytemuck::bytes_of(&range));
-        bytes.resize(bytes.len().next_multiple_of(stride), 0);
-    }
-    (bytes, dispatches)
-}
-
-/// The stride between parts in bytes.
-fn range_stride(limits: &Limits) -> usize {
-    size_of::<PatchRange>().next_multiple_of(limits.min_uniform_buffer_offset_alignment as usize)
 }
 
 fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) -> Result<PatchBins, RenderError> {

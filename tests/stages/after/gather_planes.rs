@@ -75,6 +75,7 @@ fn gathered(prepared: &Prepared<'_>, stage: &Gather, first_hit: Option<f64>, ban
         first_row,
         first_patch: first_row / patch_bins::PATCH[1] * columns,
         end_patch: (first_row / patch_bins::PATCH[1] + rows.div_ceil(patch_bins::PATCH[1])) * columns,
+        row_step: 1,
     };
     let ranges: Vec<PatchRange> = bands.iter().map(range).collect();
     let empty =

@@ -90,6 +90,7 @@ impl<'a> Fixture<'a> {
                 first_row,
                 first_patch: first_row / tile_rows * columns,
                 end_patch: (first_row / tile_rows + rows.div_ceil(tile_rows)) * columns,
+                row_step: 1,
             })
             .collect();
         let accs: Vec<_> = bands
