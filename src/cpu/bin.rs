@@ -46,8 +46,9 @@ pub(super) fn place(bricks: &[Brick], projection: &Projection, support: f64) -> 
     const AT_A_TIME: usize = 1024;
     let of_chunk = |(chunk, bricks): (usize, &[Brick])| {
         let numbered = (chunk * AT_A_TIME..).zip(bricks);
-        let placed = numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support));
-        placed.collect::<Vec<_>>()
+        let mut placed = Vec::with_capacity(bricks.len());
+        placed.extend(numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support)));
+        placed
     };
     by_first(&bricks.par_chunks(AT_A_TIME).enumerate().map(of_chunk).collect::<Vec<_>>())
 }

@@ -1,7 +1,7 @@
 //! A frame: the data that its tiles share, and its rows of tiles drawn on all cores.
 
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use fearless_simd::{Level, Simd, dispatch};
 use glam::UVec3;
@@ -282,9 +282,9 @@ pub(super) struct Outputs {
     pub(super) has_extremes: bool,
 }
 
-/// Draws the tiles of a region of an image on all cores by `draw_tile`, which gets its thread's walk, the tile's first pixel and its bricks: the
+/// Draws the tiles of a region of an image on all cores by `draw_tile`, which gets a walk that no other tile uses meanwhile, the tile's first pixel and its bricks: the
 /// region's pixels, first hits if they are requested, and counts of the work.
-pub(super) fn draw_tiles<W>(
+pub(super) fn draw_tiles<W: Send>(
     (size, region): ([u32; 2], &Region),
     Outputs { has_hits, has_extremes }: Outputs,
     placed: &[Placed],
@@ -301,13 +301,19 @@ pub(super) fn draw_tiles<W>(
     let strips: Vec<_> = strips(&mut colors, region).into_iter().zip(others).collect();
     let first_row = region.rows().start / ROWS;
     let by_row = bin::by_row(placed, first_row + strips.len());
+    let walks = Mutex::new(Vec::new());
+    let idle_walks = || walks.lock().unwrap_or_else(PoisonError::into_inner);
     let tally = strips.into_par_iter().enumerate().map(|(at, (colors, (extremes, hits)))| {
         let row = first_row + at;
         let bins = bin::by_tile(placed, &by_row[row], columns);
-        let tiles = bins[drawn.clone()]
-            .par_iter()
-            .zip(drawn.clone())
-            .map_init(&new_walk, |walk, (bricks, column)| draw_tile(walk, [column * COLUMNS, row * ROWS], bricks));
+        // Tile by tile, because a thread that is handed several of the last ones draws alone while others wait.
+        let tiles = bins[drawn.clone()].par_iter().zip(drawn.clone()).with_max_len(1).map(|(bricks, column)| {
+            let idle = idle_walks().pop();
+            let mut walk = idle.unwrap_or_else(&new_walk);
+            let tile = draw_tile(&mut walk, [column * COLUMNS, row * ROWS], bricks);
+            idle_walks().push(walk);
+            tile
+        });
         let mut tally = Tally::default();
         for (column, tile) in drawn.clone().zip(tiles.collect::<Vec<_>>()) {
             tally += tile.tally;

@@ -62,13 +62,8 @@ impl<I: Iterator> Loop<I> {
         self
     }
 
-    pub(crate) fn map_init<S, T>(
-        self,
-        init: impl FnOnce() -> S,
-        mut f: impl FnMut(&mut S, I::Item) -> T,
-    ) -> Loop<impl Iterator<Item = T>> {
-        let mut state = init();
-        Loop(self.0.map(move |item| f(&mut state, item)))
+    pub(crate) fn with_max_len(self, _: usize) -> Self {
+        self
     }
 
     pub(crate) fn for_each_init<S>(self, init: impl FnOnce() -> S, mut f: impl FnMut(&mut S, I::Item)) {
