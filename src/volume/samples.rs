@@ -90,10 +90,16 @@ macro_rules! sample_types {
 
             /// Appends the samples in `bytes`, a whole number of them. Stops at a sample that is not allowed and returns it as the error.
             pub(super) fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
+                let mut swapped = Vec::new();
+                let mut bytes = bytes;
+                if layout.big_endian {
+                    swapped.extend_from_slice(bytes);
+                    swapped.chunks_exact_mut(self.bytes() as usize).for_each(<[u8]>::reverse);
+                    bytes = &swapped;
+                }
                 match self {
                     $(Self::$name => {
-                        let from_bytes = if layout.big_endian { <$type>::from_be_bytes } else { <$type>::from_le_bytes };
-                        let samples = bytes.as_chunks().0.iter().map(|&sample| from_bytes(sample));
+                        let samples = bytes.as_chunks().0.iter().map(|&sample| <$type>::from_le_bytes(sample));
                         match layout.rescale {
                             None => append(samples, into),
                             Some([slope, intercept]) => {
@@ -120,11 +126,16 @@ sample_types!(
     F64: f64 = "float64"
 );
 
-fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S>, into: &mut Vec<T>) -> Result<(), f64> {
-    for sample in samples {
-        into.push(T::of(sample).ok_or_else(|| sample.to_f64())?);
-    }
-    Ok(())
+fn append<S: Sample, T: Voxel>(
+    samples: impl ExactSizeIterator<Item = S> + Clone,
+    into: &mut Vec<T>,
+) -> Result<(), f64> {
+    let voxel = |sample| T::of(sample);
+    let forbidden = samples.clone().position(|sample| voxel(sample).is_none());
+    let allowed = samples.clone().take(forbidden.unwrap_or(samples.len()));
+    into.extend(allowed.map(|sample| voxel(sample).unwrap_or(T::HOLE)));
+    let forbidden = forbidden.and_then(|at| samples.clone().nth(at));
+    forbidden.map_or(Ok(()), |sample| Err(sample.to_f64()))
 }
 
 /// What a header says about the samples, one per voxel of the grid.

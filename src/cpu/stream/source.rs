@@ -12,7 +12,7 @@ use crate::lists::brick::SIDE;
 use crate::lists::iso_range::ValueSet;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::range::{EMPTY, union};
+use crate::volume::range::{EMPTY, finite_range, union};
 use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
 
 /// The minimum number of voxels along each axis of a chunk that is drawn. Smaller chunks of the store are read together.
@@ -155,7 +155,7 @@ impl Source {
 
     /// Notes the values of a chunk that has been read, with those around it.
     pub(super) fn note(&self, number: u32, values: &[f32]) {
-        self.ranges.set(number, values.iter().fold(EMPTY, |range, &value| union(range, [value; 2])));
+        self.ranges.set(number, finite_range(values));
     }
 
     /// Notes that the store holds none of a chunk's values.
