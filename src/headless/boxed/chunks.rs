@@ -18,6 +18,9 @@ use crate::volume::{StreamedVolume, Volume};
 /// The part of the memory that the values of a box may take, as backends hold them several times, and that decoded chunks may take.
 const SHARE: u64 = 4;
 
+/// The part of the voxels that fit into memory whose reading takes about as long as what a step costs whatever its box.
+const STEP_SHARE: u64 = 8;
+
 /// Slabs around those of a window, which share planes with them.
 const SLABS: f64 = 2.0;
 
@@ -82,6 +85,15 @@ impl<'a> Chunks<'a> {
             }
             depth = depth.saturating_mul(2);
         }
+    }
+
+    /// The time that the first step in which slabs behind a region are drawn takes for each slab, as a number of voxels; infinite where those of the first slab
+    /// do not fit into memory.
+    pub(super) fn voxels_per_slab(&self, region: &Region, slabs: Range<i32>) -> f64 {
+        let Some((step, needed)) = self.deepest(region, slabs) else { return f64::INFINITY };
+        let a_step = self.budget() / self.voxel_bytes().max(1) / STEP_SHARE;
+        let voxels = needed.map_or(0, |needed| needed.voxels() + a_step);
+        voxels as f64 / f64::from(step.end - step.start)
     }
 
     /// The smallest box with all voxels that can change a pixel of a region in some slabs; `None` if no voxel can.

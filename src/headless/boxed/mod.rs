@@ -26,13 +26,16 @@ use crate::stats::{Counts, Stats};
 use crate::volume::range::range_of;
 use crate::volume::{StreamedVolume, check_grids};
 pub(super) use channel::opaque_values;
-use chunks::{Chunks, Filled};
+use chunks::{Chunks, Filled, Step};
 
 /// The side in pixels of the regions that an image is divided into. A region whose voxels do not fit into memory is divided further.
 const SIDE: u32 = 256;
 
 /// The minimum side of a region.
 const LEAST_SIDE: u32 = 8;
+
+/// The part of a region's time that its quarters must take less than, so that they are drawn instead.
+const DIVIDED: f64 = 0.8;
 
 /// A view of a volume that is read while it is drawn.
 #[derive(Clone, Debug)]
@@ -151,17 +154,17 @@ impl Walk<'_> {
     }
 
     /// Draws slabs behind what a region shows already, as many at a time as fit into memory with the voxels that the region's open pixels need. Where those of
-    /// a single slab do not fit, the quarters of the region are drawn.
+    /// a single slab do not fit, or quarters of the region share fewer voxels, which are read for each of them, the quarters are drawn.
     fn behind(&mut self, region: Region, mut slabs: Range<i32>, mut drawn: Content) -> Result<Content, RenderError> {
         while slabs.start < slabs.end {
             let Some(open) = self.open_box(&drawn, &region) else { break };
-            let Some((step, needed)) = self.chunks.deepest(&open, slabs.clone()) else {
-                let longer = open.width.max(open.height);
+            let longer = open.width.max(open.height);
+            let quarters = tiles(&open, longer.div_ceil(2).max(LEAST_SIDE));
+            let Some((step, needed)) = self.step(&open, &quarters, &slabs) else {
                 if longer <= LEAST_SIDE {
                     return Err(self.chunks.too_large().into());
                 }
-                let side = longer.div_ceil(2).max(LEAST_SIDE);
-                for quarter in tiles(&open, side) {
+                for quarter in quarters {
                     let behind = self.behind(quarter, slabs.clone(), cut_out(&drawn, &region, &quarter))?;
                     put((&behind, &quarter), (&mut drawn, &region));
                 }
@@ -177,6 +180,15 @@ impl Walk<'_> {
             }
         }
         Ok(drawn)
+    }
+
+    /// The first step in which slabs behind a region are drawn; `None` if its quarters are to be drawn instead.
+    fn step(&self, region: &Region, quarters: &[Region], slabs: &Range<i32>) -> Option<Step> {
+        let whole = self.chunks.voxels_per_slab(region, slabs.clone());
+        let of_quarters = quarters.iter().map(|quarter| self.chunks.voxels_per_slab(quarter, slabs.clone()));
+        // A flat box around what an oblique region sees is mostly empty of it.
+        let is_divided = quarters.len() > 1 && of_quarters.sum::<f64>() < DIVIDED * whole;
+        if is_divided { None } else { self.chunks.deepest(region, slabs.clone()) }
     }
 
     /// Draws a window from the voxels that it needs, behind what its region shows already.
