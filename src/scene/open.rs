@@ -10,7 +10,9 @@ use super::{Scene, load};
 use crate::error::setting::SettingError;
 use crate::parallel;
 use crate::settings::splatting::{Classification, Interpolation, Method, Splatting};
-use crate::volume::{Access, Grid, ReadOptions, StoreIndex, StreamedLevel, StreamedVolume, Volume, VolumeError};
+use crate::volume::{
+    Access, COLOR_BYTES, Grid, ReadOptions, StoreIndex, StreamedLevel, StreamedVolume, Volume, VolumeError,
+};
 
 /// A volume that can be drawn.
 #[derive(Clone, Debug)]
@@ -101,23 +103,23 @@ impl Scene {
         Ok((volume.into(), access.files()))
     }
 
-    /// Checks that the scene can show a volume that is read while it is drawn: values without colours of their own, with image-aligned sheets, and interpolated as
-    /// they are. The sample must have the volume's channels and labels.
+    /// Checks that the scene can show a volume that is read while it is drawn: with image-aligned sheets, and interpolated as they are. The sample must have
+    /// the volume's channels, labels and colours.
     pub(crate) fn check_streamed(&self, volume: &StreamedVolume) -> Result<(), SettingError> {
         let refused = |key: &str, found: &str, allowed: &str| {
             let found = format!("{found} for a volume that is streamed");
             Err(SettingError::new(key, found, format!("{allowed}, or more memory")))
         };
         let sample = &volume.sample;
-        if sample.channels().any(|channel| channel.colors().is_some()) {
-            return refused("volume", "colours", "values");
-        }
-        let of_stores: Vec<bool> = volume.channels().map(|channel| channel.labels.is_some()).collect();
-        let of_sample: Vec<bool> = sample.channels().map(|channel| channel.labels().is_some()).collect();
+        // Whether each channel has labels, and whether it has colours.
+        let of_stores: Vec<[bool; 2]> =
+            volume.channels().map(|of| [of.labels.is_some(), of.values.store.has_colors()]).collect();
+        let of_sample: Vec<[bool; 2]> =
+            sample.channels().map(|of| [of.labels().is_some(), of.colors().is_some()]).collect();
         if of_stores != of_sample {
-            let [found, allowed] = [of_sample, of_stores].map(|labelled| {
-                let count = labelled.iter().filter(|is_labelled| **is_labelled).count();
-                format!("{} channels, {count} of them with labels", labelled.len())
+            let [found, allowed] = [of_sample, of_stores].map(|channels| {
+                let count = |which: usize| channels.iter().filter(|has| has[which]).count();
+                format!("{} channels, {} of them with labels and {} with colours", channels.len(), count(0), count(1))
             });
             return Err(SettingError::new(
                 "volume",
@@ -154,7 +156,8 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
             let Some(of) = store.levels().get(*level) else { return Ok(None) };
             let held = if is_labels { of_voxels(of.grid.dims, 2) } else { store.memory(*level) };
             bytes = held.saturating_add(bytes);
-            largest = largest.max(of_voxels(of.chunk, 4));
+            let read = if store.has_colors() { COLOR_BYTES } else { size_of::<f32>() as u64 };
+            largest = largest.max(of_voxels(of.chunk, read));
         }
     }
     // Every thread that draws or reads holds some chunks, beside those that wait for other tiles.

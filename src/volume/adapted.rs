@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::{DVec3, UVec3};
 
 use super::grid::check_spacing;
-use super::{Store, StoreFacts, StoreLevel, VolumeError, refused};
+use super::{Store, StoreFacts, StoreLevel, Texel, VolumeError, refused};
 
 /// A function that is told how many chunks of a level have been read, and how many there are.
 pub type ChunkProgress = dyn Fn(u64, u64) + Send + Sync;
@@ -41,6 +41,13 @@ impl AdaptedStore {
         let levels = store.levels().to_vec();
         let watch = Watch::new(level, levels[level].chunks(), tally);
         Self { store, levels, watch: Some(watch) }
+    }
+
+    /// Tells of a box of a level that has been read.
+    fn note(&self, level: usize, from: UVec3, dims: UVec3) {
+        if let Some(watch) = self.watch.as_ref().filter(|watch| watch.level == level) {
+            watch.note(&self.levels[level], from, dims);
+        }
     }
 }
 
@@ -102,9 +109,24 @@ impl Store for AdaptedStore {
 
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
         let bytes = self.store.read(level, from, dims, values)?;
-        if let Some(watch) = self.watch.as_ref().filter(|watch| watch.level == level) {
-            watch.note(&self.levels[level], from, dims);
-        }
+        self.note(level, from, dims);
+        Ok(bytes)
+    }
+
+    fn has_colors(&self) -> bool {
+        self.store.has_colors()
+    }
+
+    fn read_colors(
+        &self,
+        level: usize,
+        from: UVec3,
+        dims: UVec3,
+        values: &mut [f32],
+        colors: &mut [Texel],
+    ) -> Result<u64, VolumeError> {
+        let bytes = self.store.read_colors(level, from, dims, values, colors)?;
+        self.note(level, from, dims);
         Ok(bytes)
     }
 

@@ -10,6 +10,9 @@ use crate::parallel::prelude::*;
 /// Red, green, blue and A of a voxel, each from 0 to [`u16::MAX`], which stands for 1. Numbers of 8 and 16 bits are exact.
 pub type Texel = [u16; 4];
 
+/// The bytes that a voxel takes while its colour is made of its components, beside these: its numbers side by side, its luminance and its colour.
+pub(crate) const COLOR_BYTES: u64 = size_of::<([f32; 4], f32, Texel)>() as u64;
+
 /// The weights of red, green and blue in the luminance (ITU-R BT.709).
 const LUMINANCE: DVec3 = DVec3::new(0.2126, 0.7152, 0.0722);
 
@@ -27,7 +30,7 @@ impl Volume {
         (colors, kind): (&[[f32; 4]], SampleType),
     ) -> Result<Self, VolumeError> {
         let values = colors.par_iter().map(|color| luminance(*color)).collect();
-        let texels: Arc<[Texel]> = colors.par_iter().map(|color| color.map(|number| share(number, kind))).collect();
+        let texels: Arc<[Texel]> = colors.par_iter().map(|color| texel(*color, kind)).collect();
         Ok(Self { colors: Some(texels), ..Self::new(origin, dims, spacing, values)? })
     }
 
@@ -50,6 +53,11 @@ impl Volume {
         Self::from_colors(origin, dims, spacing, (&colors, kind))
     }
 
+    /// The volume of the luminances that its values are, with the colours, one for each voxel.
+    pub(crate) fn with_texels(self, colors: Vec<Texel>) -> Self {
+        Self { colors: Some(colors.into()), ..self }
+    }
+
     /// The colours of all voxels, if this is a volume of colours.
     pub fn colors(&self) -> Option<&[Texel]> {
         self.colors.as_deref()
@@ -69,8 +77,13 @@ impl Volume {
     }
 }
 
+/// The colour of stored numbers of a type.
+pub(super) fn texel(numbers: [f32; 4], kind: SampleType) -> Texel {
+    numbers.map(|number| share(number, kind))
+}
+
 /// The luminance of stored numbers; NaN if one of them, or A, is not finite.
-fn luminance([red, green, blue, alpha]: [f32; 4]) -> f32 {
+pub(super) fn luminance([red, green, blue, alpha]: [f32; 4]) -> f32 {
     let numbers = DVec3::new(red.into(), green.into(), blue.into());
     if numbers.is_finite() && alpha.is_finite() { numbers.dot(LUMINANCE) as f32 } else { f32::NAN }
 }

@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use glam::UVec3;
 
-use super::range::{EMPTY, union};
-use super::{Store, StoreFacts, StoreLevel, VolumeError};
+use super::range::{EMPTY, finite_range, union};
+use super::{Store, StoreFacts, StoreLevel, Texel, VolumeError};
 use crate::parallel::prelude::*;
 
 /// The first line of a file.
@@ -127,12 +127,12 @@ impl Level {
             let at = UVec3::new(at % chunks.x, at / chunks.x % chunks.y, at / (chunks.x * chunks.y));
             progress();
             if !store.contains(number, at)? {
-                return Ok(of_values(&[store.fill()]));
+                return Ok(finite_range(&[store.fill()]));
             }
             let (from, dims) = (at * *chunk, (*chunk).min(grid.dims - at * *chunk));
             let mut values = vec![0.0; dims.element_product() as usize];
             store.read(number, from, dims, &mut values)?;
-            Ok(of_values(&values))
+            Ok(finite_range(&values))
         };
         let ranges = (0..count as u32).into_par_iter().map(range).collect::<Result<_, VolumeError>>()?;
         Ok(Self { chunks, ranges })
@@ -151,11 +151,6 @@ fn invalid_in(
 /// The number of chunks, which may be more than 64 bits hold where metadata lie.
 fn count_of(chunks: UVec3) -> u128 {
     chunks.to_array().map(u128::from).iter().product()
-}
-
-/// The range of the finite values.
-fn of_values(values: &[f32]) -> [f32; 2] {
-    values.iter().filter(|value| value.is_finite()).fold(EMPTY, |range, &value| union(range, [value; 2]))
 }
 
 /// Numbers with spaces between.
@@ -195,7 +190,7 @@ impl IndexedStore {
 
     /// Checks that the index has the fill value alone for a chunk that the store does not hold: it was made when the store held others.
     fn check_absent(&self, level: usize, chunk: UVec3) -> Result<(), VolumeError> {
-        let absent = of_values(&[self.store.fill()]);
+        let absent = finite_range(&[self.store.fill()]);
         match self.chunk_range(level, chunk) {
             Some(range) if range != absent => {
                 let [min, max] = range;
@@ -212,7 +207,7 @@ impl IndexedStore {
     /// was read of one is the fill value, the store may lack it.
     fn check_read(&self, level: usize, (from, dims): (UVec3, UVec3), values: &[f32]) -> Result<(), VolumeError> {
         let (side, fill) = (self.levels()[level].chunk, self.store.fill());
-        let absent = of_values(&[fill]);
+        let absent = finite_range(&[fill]);
         let is_fill = |voxel: UVec3| {
             let [x, y, z] = (voxel - from).to_array().map(|n| n as usize);
             let value = values[x + dims.x as usize * (y + dims.y as usize * z)];
@@ -242,6 +237,23 @@ impl Store for IndexedStore {
 
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
         let bytes = self.store.read(level, from, dims, values)?;
+        self.check_read(level, (from, dims), values)?;
+        Ok(bytes)
+    }
+
+    fn has_colors(&self) -> bool {
+        self.store.has_colors()
+    }
+
+    fn read_colors(
+        &self,
+        level: usize,
+        from: UVec3,
+        dims: UVec3,
+        values: &mut [f32],
+        colors: &mut [Texel],
+    ) -> Result<u64, VolumeError> {
+        let bytes = self.store.read_colors(level, from, dims, values, colors)?;
         self.check_read(level, (from, dims), values)?;
         Ok(bytes)
     }

@@ -71,6 +71,7 @@ pub(crate) use adapted::AdaptedStore;
 pub use adapted::ChunkProgress;
 pub(crate) use address::{is_address, written_in};
 use coefficients::KeptCoefficients;
+pub(crate) use colors::COLOR_BYTES;
 pub use colors::Texel;
 pub use display::ChannelDisplay;
 pub use file::{BytesRead, Files};
@@ -296,6 +297,8 @@ impl Volume {
         let origin = path.display().to_string();
         let spacing = spacing.unwrap_or(DVec3::ONE);
         if series.is_color {
+            let bytes = COLOR_BYTES * u64::from(dims.element_product());
+            access.reserve(path, "data", format!("{dims} voxels with colours"), bytes)?;
             let volume = Self::from_components(&origin, dims, spacing, (values.as_slice(), sample_type))?;
             let facts = facts.next().unwrap_or_default();
             return volume.stating(&origin, StoreFacts { palette: None, channel_name: None, display: None, ..facts });

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, UVec3};
 
-use super::{Grid, Store, StoreLevel, Values, Volume, VolumeError, invalid};
+use super::{Grid, Store, StoreLevel, Texel, Values, Volume, VolumeError, invalid};
 use crate::parallel::prelude::*;
 use crate::stats::StoreCounts;
 
@@ -19,8 +19,13 @@ const MOST_CHUNKS: u64 = 1000;
 /// If the store cannot be read, or holds no finite value there.
 pub fn sample(origin: &str, store: &dyn Store, memory: u64) -> Result<Volume, VolumeError> {
     let grids: Vec<Grid> = store.levels().iter().map(|level| level.grid).collect();
-    let (number, step) = spread(&grids, memory);
+    let (number, step) = spread(&grids, memory / parts_of(store));
     sample_at(origin, store, (number, step))
+}
+
+/// The memory of a voxel of a store, counted in values.
+pub(super) fn parts_of(store: &dyn Store) -> u64 {
+    if store.has_colors() { 1 + (size_of::<Texel>() / size_of::<f32>()) as u64 } else { 1 }
 }
 
 /// Of some levels, from the finest, the number of the one that a sample of at most `memory` bytes is taken of, and the sample's step in voxels.
@@ -40,13 +45,11 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
     let level = &levels[number];
     let dims = level.grid.dims.map(|count| count.div_ceil(step));
     let mut values = vec![0.0; dims.element_product() as usize];
+    let mut colors = vec![Texel::default(); if store.has_colors() { values.len() } else { 0 }];
     let (pieces, reads) = pieces(store, number, level, step)?;
-    for Piece { from, dims: piece_dims, values: piece } in pieces {
-        for (at, row) in piece.chunks(piece_dims.x as usize).enumerate() {
-            let (y, z) = (from.y + at as u32 % piece_dims.y, from.z + at as u32 / piece_dims.y);
-            let first = (from.x + dims.x * (y + dims.y * z)) as usize;
-            values[first..first + row.len()].copy_from_slice(row);
-        }
+    for piece in pieces {
+        put(&piece.values, &piece, (&mut values, dims));
+        put(&piece.colors, &piece, (&mut colors, dims));
     }
     let spacing = level.grid.spacing * f64::from(step);
     // The first voxel of the sample is the level's first.
@@ -56,6 +59,7 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
     let grid = if number == 0 && step == 1 { level.grid } else { grid.coarser_than(&levels[0].grid, place) };
     let count = values.len() as u64;
     let volume = Volume::punched(grid, Values::from(values).narrowed());
+    let volume = if store.has_colors() { volume.with_texels(colors) } else { volume };
     if volume.holes == count {
         let found = "only NaN or infinite samples".to_owned();
         return Err(invalid(origin, "data", found, "at least one finite sample".to_owned()));
@@ -63,19 +67,31 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
     Volume { reads: Some(reads), ..volume }.stating(origin, store.facts())
 }
 
-/// The voxels of a sample that lie in one chunk: the first one, how many there are along each axis, and their values.
+/// The voxels of a sample that lie in one chunk: the first one, how many there are along each axis, their values, and their colours if they have any.
 struct Piece {
     from: UVec3,
     dims: UVec3,
     values: Vec<f32>,
+    colors: Vec<Texel>,
 }
 
-/// What was read of a chunk: the first voxel and the voxels along each axis, their values, and the bytes of the store; no values if the store does not hold it.
+/// What was read of a chunk: the first voxel and the voxels along each axis, their values and colours, and the bytes of the store; no values if the store does
+/// not hold it.
 struct Read {
     low: UVec3,
     dims: UVec3,
     values: Option<Vec<f32>>,
+    colors: Vec<Texel>,
     bytes: u64,
+}
+
+/// Puts what a piece has of each of its voxels, if it has anything, where they are in the sample.
+fn put<T: Copy>(own: &[T], Piece { from, dims: own_dims, .. }: &Piece, (to, dims): (&mut [T], UVec3)) {
+    for (at, row) in (0..).zip(own.chunks(own_dims.x as usize)) {
+        let (y, z) = (from.y + at % own_dims.y, from.z + at / own_dims.y);
+        let first = (from.x + dims.x * (y + dims.y * z)) as usize;
+        to[first..first + row.len()].copy_from_slice(row);
+    }
 }
 
 /// Every `step`th voxel of a level, chunk by chunk; and what was read for it.
@@ -118,11 +134,16 @@ fn read(store: &dyn Store, number: usize, level: &StoreLevel, chunk: UVec3) -> R
     let (low, high) = (chunk * level.chunk, ((chunk + 1) * level.chunk).min(level.grid.dims));
     let dims = high - low;
     if !store.contains(number, chunk)? {
-        return Ok(Read { low, dims, values: None, bytes: 0 });
+        return Ok(Read { low, dims, values: None, colors: Vec::new(), bytes: 0 });
     }
     let mut values = vec![0.0; dims.element_product() as usize];
-    let bytes = store.read(number, low, dims, &mut values)?;
-    Ok(Read { low, dims, values: Some(values), bytes })
+    let mut colors = vec![Texel::default(); if store.has_colors() { values.len() } else { 0 }];
+    let bytes = if store.has_colors() {
+        store.read_colors(number, low, dims, &mut values, &mut colors)?
+    } else {
+        store.read(number, low, dims, &mut values)?
+    };
+    Ok(Read { low, dims, values: Some(values), colors, bytes })
 }
 
 /// The sample's voxels within a chunk, from the values of this chunk or of a neighbour that stands for it; `None` if the sample has no voxel there.
@@ -139,14 +160,16 @@ fn piece(
         return None;
     }
     let dims = end - from;
-    let value = |x: u32, y: u32, z: u32| {
-        let Some(values) = &read.values else { return store.fill() };
-        let at = (UVec3::new(x, y, z) * step - low).min(read.dims - 1);
-        values[(at.x + read.dims.x * (at.y + read.dims.y * at.z)) as usize]
+    let index = |voxel: UVec3| {
+        let at = (voxel * step - low).min(read.dims - 1);
+        (at.x + read.dims.x * (at.y + read.dims.y * at.z)) as usize
     };
-    let rows = (from.z..end.z).flat_map(|z| (from.y..end.y).map(move |y| (y, z)));
+    let rows = || (from.z..end.z).flat_map(|z| (from.y..end.y).map(move |y| (y, z)));
+    let indices = || rows().flat_map(|(y, z)| (from.x..end.x).map(move |x| UVec3::new(x, y, z))).map(index);
     let mut values: Vec<f32> =
-        rows.flat_map(|(y, z)| (from.x..end.x).map(move |x| (x, y, z))).map(|(x, y, z)| value(x, y, z)).collect();
+        indices().map(|index| read.values.as_ref().map_or(store.fill(), |values| values[index])).collect();
+    let texel = |index: usize| read.colors.get(index).copied().unwrap_or_default();
+    let colors = if store.has_colors() { indices().map(texel).collect() } else { Vec::new() };
     if read.low != low
         && let Some([min, max]) = store.chunk_range(number, chunk)
     {
@@ -157,7 +180,7 @@ fn piece(
             values.fill(f32::NAN);
         }
     }
-    Some(Piece { from, dims, values })
+    Some(Piece { from, dims, values, colors })
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ use super::samples::{SIZES, Samples, dims_of};
 use super::seek::{FileStore, Located};
 use super::series::Series;
 use super::source::invalid;
-use super::{ChannelDisplay, Encoding, Grid, Orientation, RawLayout, VolumeError};
+use super::{ChannelDisplay, Encoding, Grid, Orientation, RawLayout, Texel, VolumeError};
 
 /// A volume that is read by boxes (SPEC §13): one channel at one time.
 ///
@@ -29,6 +29,27 @@ pub trait Store: Send + Sync + Debug {
     /// # Errors
     /// If the box does not lie in the level, or the store cannot be read or is damaged there. The error names the chunk. `values` may then hold anything.
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError>;
+
+    /// Whether voxels have colours of their own (SPEC §10); values are then their luminances.
+    fn has_colors(&self) -> bool {
+        false
+    }
+
+    /// As [`Self::read`], with the colours of the box's voxels, as many as values. A store implements it that has any. Voxels of a chunk that it does not hold
+    /// are transparent.
+    ///
+    /// # Errors
+    /// As for [`Self::read`]. `colors` may then hold anything, too.
+    fn read_colors(
+        &self,
+        level: usize,
+        from: UVec3,
+        dims: UVec3,
+        values: &mut [f32],
+        _colors: &mut [Texel],
+    ) -> Result<u64, VolumeError> {
+        self.read(level, from, dims, values)
+    }
 
     /// Whether the store holds a chunk; all values of one that it does not hold are [`Self::fill`]. `chunk` counts chunks of [`StoreLevel::chunk`] voxels.
     ///
@@ -171,7 +192,7 @@ pub(crate) fn raw_store(path: &Path, layout: &RawLayout, access: &Access) -> Res
     let encoding = Encoding { format: raw::FORMAT, sample_type: kind, channels: 1, times: 1 };
     let facts = StoreFacts { encoding: Some(encoding), ..StoreFacts::default() };
     located.series.check(path, access.selection())?;
-    Ok(Arc::new(FileStore::new(located, 0, DVec3::ONE, facts, access)?))
+    Ok(Arc::new(FileStore::new(located, 0..1, DVec3::ONE, facts, access)?))
 }
 
 /// Checks that a box lies in a level, and that there is a value for each of its voxels.

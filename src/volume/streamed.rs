@@ -6,7 +6,7 @@ use glam::UVec3;
 
 use super::adapted::{AdaptedStore, Tally};
 use super::resample::{Oriented, is_same_grid};
-use super::sample::{sample_at, spread};
+use super::sample::{parts_of, sample_at, spread};
 use super::{ChunkProgress, Grid, IndexedStore, Labels, Store, StoreIndex, Volume, VolumeError, invalid, labels_of};
 use crate::stats::StoreCounts;
 
@@ -183,10 +183,11 @@ impl StreamedVolume {
         Self { first, further: Vec::new(), sample: Arc::new(sample), memory: self.memory }
     }
 
-    /// The values of the only channel, if there are no others and no labels.
+    /// The values of the only channel, if there are no others, no labels and no colours.
     #[cfg(feature = "cpu")]
     pub(crate) fn only_values(&self) -> Option<&StreamedLevel> {
-        (self.further.is_empty() && self.first.labels.is_none()).then_some(&self.first.values)
+        let StreamedChannel { values, labels } = &self.first;
+        (self.further.is_empty() && labels.is_none() && !values.store.has_colors()).then_some(values)
     }
 
     /// The number of chunks of all channels and labels.
@@ -260,8 +261,8 @@ pub(crate) fn sample_of_channels(
     // The levels that are drawn are among them.
     let common: Vec<Grid> =
         first.values.store.levels().iter().map(|level| level.grid).filter(|grid| is_on_all(grid)).collect();
-    let count = channels().flat_map(StreamedChannel::levels).count() as u64;
-    let (number, step) = spread(&common, memory / count);
+    let parts: u64 = channels().flat_map(StreamedChannel::levels).map(|of| parts_of(&*of.store)).sum();
+    let (number, step) = spread(&common, memory / parts);
     let mut reads = StoreCounts::default();
     let mut read = |of: &StreamedLevel| -> Result<Volume, VolumeError> {
         let level = of.level_on(&common[number]).unwrap_or(of.level);

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use glam::UVec3;
-use sheetsplat::volume::{Store, StoreLevel, StreamedLevel, StreamedVolume, Volume, VolumeError};
+use sheetsplat::volume::{Store, StoreLevel, StreamedLevel, StreamedVolume, Texel, Volume, VolumeError};
 
 /// A volume in memory as a store that notes what is read of it.
 #[derive(Debug)]
@@ -66,14 +66,36 @@ impl Store for MemoryStore {
         Ok(values.len() as u64)
     }
 
-    /// A chunk in which all voxels are 0 is not held.
+    fn has_colors(&self) -> bool {
+        self.volume.colors().is_some()
+    }
+
+    fn read_colors(
+        &self,
+        level: usize,
+        from: UVec3,
+        dims: UVec3,
+        values: &mut [f32],
+        colors: &mut [Texel],
+    ) -> Result<u64, VolumeError> {
+        let bytes = self.read(level, from, dims, values)?;
+        assert_eq!(colors.len(), values.len());
+        let (own, grid) = (self.volume.colors().unwrap(), self.volume.grid());
+        let voxels = (0..dims.z).flat_map(|z| (0..dims.y).flat_map(move |y| (0..dims.x).map(move |x| [x, y, z])));
+        for (color, at) in colors.iter_mut().zip(voxels) {
+            *color = own[grid.index_of(from + UVec3::from(at)) as usize];
+        }
+        Ok(bytes)
+    }
+
+    /// A chunk in which all voxels are 0 and without colours is not held.
     fn contains(&self, _: usize, chunk: UVec3) -> Result<bool, VolumeError> {
         let side = self.levels[0].chunk;
         let (from, end) = (chunk * side, ((chunk + 1) * side).min(self.volume.dims()));
         assert!(from.cmplt(end).all(), "chunk {chunk}");
         let mut voxels =
             (from.z..end.z).flat_map(|z| (from.y..end.y).flat_map(move |y| (from.x..end.x).map(move |x| [x, y, z])));
-        Ok(voxels.any(|at| self.value(at.into()) != 0.0))
+        Ok(self.has_colors() || voxels.any(|at| self.value(at.into()) != 0.0))
     }
 
     fn fill(&self) -> f32 {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use sheetsplat::volume::{RawLayout, ReadOptions, SampleType, Store, open_raw_store, open_store, sample};
+use sheetsplat::volume::{RawLayout, ReadOptions, SampleType, Store, Texel, open_raw_store, open_store, sample};
 
 use crate::*;
 
@@ -22,7 +22,15 @@ fn assert_holds(store: &Arc<dyn Store>, volume: &Volume, name: &str) {
         let at = |index: u32| from + UVec3::new(index % dims.x, index / dims.x % dims.y, index / dims.x / dims.y);
         let is_same = |(index, value): (u32, &f32)| *value == volume.value(at(index));
         assert!((0..).zip(&found).all(is_same), "{name}, {dims} from {from}: {found:?}");
+        let Some(own) = volume.colors() else { continue };
+        let mut colors = vec![Texel::default(); found.len()];
+        found.fill(0.0);
+        assert_eq!(store.read_colors(0, from, dims, &mut found, &mut colors).unwrap(), read, "{name}");
+        assert!((0..).zip(&found).all(is_same), "{name}, {dims} from {from}: {found:?}");
+        let color = |index: u32| own[volume.grid().index_of(at(index)) as usize];
+        assert!((0..).zip(&colors).all(|(index, &found)| found == color(index)), "{name}, {dims} from {from}");
     }
+    assert_eq!(store.has_colors(), volume.colors().is_some(), "{name}");
     // All of them, with whatever else the file states.
     assert!(sample(name, &**store, u64::MAX).unwrap() == *volume, "{name}: {:?}", store.facts());
 }
@@ -44,6 +52,37 @@ fn boxes_of_uncompressed_files() {
     let layout = RawLayout { dims: DIMS, sample_type: SampleType::F32, big_endian: true, offset: 7 };
     let store = open_raw_store(&fixture("float32-big-7.raw"), &layout, &ReadOptions::default()).unwrap();
     assert_holds(&store, &Volume::open_raw(&fixture("float32-big-7.raw"), &layout).unwrap(), "raw");
+}
+
+/// Components of colours lie side by side, or one volume after the other.
+#[test]
+fn boxes_of_files_of_colors() {
+    let folder = Folder::new();
+    let nrrd = |name: &str, sizes: &str, kinds: &str, samples: u16| {
+        let header = format!("NRRD0004\ntype: uint16\ndimension: 4\nsizes: {sizes}\nkinds: {kinds}\n");
+        let code = (0..samples).flat_map(|at| at.wrapping_mul(40_503).to_be_bytes());
+        let bytes: Vec<u8> =
+            format!("{header}encoding: raw\nendian: big\n\n").into_bytes().into_iter().chain(code).collect();
+        let path = folder.0.path().join(name);
+        fs::write(&path, bytes).unwrap();
+        path
+    };
+    let made = [
+        nrrd("rgb.nrrd", "3 5 4 6", "RGB-color domain domain domain", 360),
+        nrrd("planar.nrrd", "5 4 6 3", "domain domain domain RGB-color", 360),
+        nrrd("rgba.nrrd", "4 5 4 6", "RGBA-color domain domain domain", 480),
+        nrrd("planar-rgba.nrrd", "5 4 6 4", "domain domain domain RGBA-color", 480),
+    ];
+    let of_others = ["rgb.nii", "rgb.npy", "rgba.npy"].map(|name| fixture("colors").join(name));
+    for path in made.into_iter().chain(of_others) {
+        let store = open_store(&path, &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+        assert_holds(&store, &Volume::open(&path).unwrap(), &path.display().to_string());
+    }
+    let times = fixture("colors").join("times.nii");
+    let at = |time: u32| ReadOptions::default().with_time(time);
+    let store = |time: u32| open_store(&times, &at(time)).unwrap();
+    assert_holds(&store(1), &Volume::open_with(&times, &at(1)).unwrap(), "times.nii");
+    assert_ne!(store(0).identity(), store(1).identity());
 }
 
 /// Rows that lie close together in a file are read at once, up to a length that a plane here exceeds, and others one by one.

@@ -7,7 +7,7 @@ use sheetsplat::Image;
 use sheetsplat::headless::Backend;
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::{Region, Window};
-use sheetsplat::volume::{StreamedChannel, StreamedLevel, StreamedVolume, Volume, builtin};
+use sheetsplat::volume::{SampleType, StreamedChannel, StreamedLevel, StreamedVolume, Volume, builtin};
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
@@ -38,10 +38,22 @@ fn volume(channels: u32, has_labels: bool) -> Volume {
     first.with_channels("head", further).unwrap()
 }
 
-/// The bytes of a volume's values and labels.
+/// The bytes of a volume's values, colours and labels.
 fn bytes(volume: &Volume) -> u64 {
     let labels = volume.labels().map_or(0, size_of_val);
-    (volume.channels().map(|channel| 4 * channel.values().len()).sum::<usize>() + labels) as u64
+    let of_channel = |channel: &Volume| 4 * channel.values().len() + channel.colors().map_or(0, size_of_val);
+    (volume.channels().map(of_channel).sum::<usize>() + labels) as u64
+}
+
+/// A head with colours of its own, whose luminances are its values.
+fn colored() -> Volume {
+    let head = builtin::volume("head:40").unwrap();
+    let color = |(at, value): (usize, f32)| {
+        let wave = |speed: f32| value * (0.75 + 0.25 * (at as f32 * speed).sin());
+        [wave(0.003), wave(0.05), wave(0.011), 255.0 - wave(0.02) / 2.0].map(f32::round)
+    };
+    let colors: Vec<[f32; 4]> = head.values().iter().enumerate().map(color).collect();
+    Volume::from_colors("head", head.dims(), head.spacing(), (&colors, SampleType::U8)).unwrap()
 }
 
 /// The stores of a volume, the labels' last, and the volume as a stream of them, whose boxes take at most three quarters of the volume's bytes.
@@ -117,6 +129,23 @@ fn several_channels_are_those_of_the_volume_in_memory() {
             assert_same(backend, &volume, &scene);
         }
     }
+}
+
+#[test]
+fn colors_are_those_of_the_volume_in_memory() {
+    for (channels, sets) in [(1, SCENES[0]), (1, SCENES[1]), (2, SCENES[2]), (1, SCENES[3]), (2, SCENES[4])] {
+        let further = if channels == 2 { vec![volume(1, false)] } else { Vec::new() };
+        let volume = colored().with_channels("head", further).unwrap();
+        for backend in BACKENDS {
+            assert_same(backend, &volume, &scene(channels, sets));
+        }
+    }
+    let headless = headless(Backend::Reference);
+    let (_, streamed) = streamed(&colored());
+    let gray = StreamedVolume { sample: Arc::new(volume(1, false)), ..streamed };
+    let error = headless.render_volume(gray, &scene(1, &[])).unwrap_err().to_string();
+    let words = "found a sample of 1 channels, 0 of them with labels and 0 with colours, allowed: 1 channels, 0 of them with labels and 1 with colours";
+    assert!(error.contains(words), "{error}");
 }
 
 /// Channels that share no sheets are drawn one by one.

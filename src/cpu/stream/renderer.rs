@@ -66,8 +66,13 @@ impl StreamRenderer {
     /// If the store has no such level, or its chunks are too many or too large; if the volume has labels, colours or several channels; or if a setting is not supported: exact interpolation, and methods other than image-aligned.
     pub fn new(volume: StreamedVolume, scene: &Scene) -> Result<Self, RenderError> {
         let Some(values) = volume.only_values().cloned() else {
-            let found = if volume.further.is_empty() { "labels" } else { "several channels" };
-            let allowed = "one channel of values without labels, or `Headless`, which draws others box by box";
+            let found = match (&volume.first, volume.further.is_empty()) {
+                (_, false) => "several channels",
+                (first, _) if first.labels.is_some() => "labels",
+                _ => "colours",
+            };
+            let allowed =
+                "one channel of values without labels and colours, or `Headless`, which draws others box by box";
             return Err(SettingError::new("volume", format!("{found} of a volume that is streamed"), allowed).into());
         };
         let levels = values.store.levels();

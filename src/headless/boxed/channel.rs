@@ -13,8 +13,10 @@ use crate::parallel::current_num_threads;
 use crate::parallel::prelude::*;
 use crate::settings::splatting::{Classification, Compositing, Splatting};
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::range::{EMPTY, union};
-use crate::volume::{Grid, Labels, StoreLevel, StreamedChannel, StreamedLevel, Values, Volume, VolumeError, labels_of};
+use crate::volume::range::{EMPTY, finite_range, union};
+use crate::volume::{
+    Grid, Labels, Store, StoreLevel, StreamedChannel, StreamedLevel, Texel, Values, Volume, VolumeError, labels_of,
+};
 
 /// The maximum number of chunks of a level.
 const MOST_CHUNKS: u64 = 1 << 24;
@@ -79,10 +81,11 @@ impl<'a> ChannelChunks<'a> {
         std::iter::once(&self.values).chain(&self.labels)
     }
 
-    /// The bytes in memory of a voxel's value and label.
+    /// The bytes in memory of a voxel's value, colour and label.
     pub(super) fn voxel_bytes(&self) -> u64 {
         let labels = if self.labels.is_some() { size_of::<u16>() } else { 0 };
-        (size_of::<f32>() + labels) as u64
+        let colors = if self.values.of.store.has_colors() { size_of::<Texel>() } else { 0 };
+        (size_of::<f32>() + colors + labels) as u64
     }
 
     /// Reads a box of the channel, whose voxels lie on a grid; `None` if nothing of it can be seen.
@@ -93,13 +96,15 @@ impl<'a> ChannelChunks<'a> {
         if !self.is_visible(within)? {
             return Ok(None);
         }
-        let volume = Volume::punched(*grid, self.values.read(within)?);
-        if !self.counts_all && volume.holes() == within.voxels() {
+        let Voxels { values, colors, range } = self.values.read(within)?;
+        if !self.counts_all && !self.has_opaque(range) {
             return Ok(None);
         }
+        let volume = Volume::punched(*grid, values);
+        let volume = if self.values.of.store.has_colors() { volume.with_texels(colors) } else { volume };
         let Some(labels) = &mut self.labels else { return Ok(Some(volume)) };
         let origin = labels.of.origin.clone();
-        let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read(within)?)?;
+        let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read(within)?.values)?;
         let labels = Labels { origin, dims: grid.dims, spacing: None, values, names: BTreeMap::new() };
         Ok(Some(volume.with_labels(labels)?))
     }
@@ -131,8 +136,12 @@ impl<'a> ChannelChunks<'a> {
                 range = union(range, [store.fill(); 2]);
             }
         }
-        let [min, max] = range;
-        Ok(min <= max && self.opaque.meets(min, max))
+        Ok(self.has_opaque(range))
+    }
+
+    /// Whether a value of a range, which may be empty, has an opacity.
+    fn has_opaque(&self, [min, max]: [f32; 2]) -> bool {
+        min <= max && self.opaque.meets(min, max)
     }
 }
 
@@ -161,13 +170,28 @@ pub(super) struct LevelChunks<'a> {
     kept: Option<Kept>,
 }
 
-/// What was read of a chunk for a box: the first voxel and the voxels along each axis, their values, and the bytes of the store; no bytes if the store does not hold
-/// the chunk.
+/// The values of some voxels, their range, and the voxels' colours if they have any.
+struct Voxels {
+    values: Vec<f32>,
+    range: [f32; 2],
+    colors: Vec<Texel>,
+}
+
+impl Voxels {
+    /// As many voxels of one value, as the store has them.
+    fn filled(store: &dyn Store, count: u32, value: f32) -> Self {
+        let colors = if store.has_colors() { count } else { 0 };
+        Self { values: vec![value; count as usize], range: EMPTY, colors: vec![Texel::default(); colors as usize] }
+    }
+}
+
+/// What was read of a chunk for a box: the first voxel and the voxels along each axis, what they are, and the bytes of the store; no bytes if the store does not
+/// hold the chunk.
 struct Piece {
     chunk: UVec3,
     low: UVec3,
     dims: UVec3,
-    values: Vec<f32>,
+    voxels: Voxels,
     bytes: Option<u64>,
 }
 
@@ -182,7 +206,7 @@ impl<'a> LevelChunks<'a> {
         }
         let values = level.chunk.min(level.grid.dims).as_u64vec3().element_product();
         let at_once = values.saturating_mul(size_of::<f32>() as u64).saturating_mul(current_num_threads() as u64);
-        let is_kept = of.store.decodes_whole_chunks() && at_once <= kept;
+        let is_kept = of.store.decodes_whole_chunks() && !of.store.has_colors() && at_once <= kept;
         Ok(Self { of, level, read: HashSet::new(), bytes_read: 0, kept: is_kept.then(|| Kept::new(kept)) })
     }
 
@@ -206,24 +230,24 @@ impl<'a> LevelChunks<'a> {
         between(low / self.level.chunk, (end - 1) / self.level.chunk)
     }
 
-    /// Reads the values of a box.
-    fn read(&mut self, within: VoxelBox) -> Result<Vec<f32>, VolumeError> {
+    /// Reads the voxels of a box.
+    fn read(&mut self, within: VoxelBox) -> Result<Voxels, VolumeError> {
         let VoxelBox { low, end } = within;
         let chunks: Vec<UVec3> = self.chunks(within).collect();
         let grid = self.level.grid.part(low, end - low);
         let pieces = chunks.into_par_iter().map(|chunk| self.piece(chunk, within));
         let pieces = pieces.collect::<Result<Vec<_>, _>>()?;
-        let mut values = vec![f32::NAN; grid.dims.element_product() as usize];
-        for Piece { chunk, low: from, dims, values: own, bytes } in pieces {
-            for (row, number) in own.chunks_exact(dims.x as usize).zip(0..) {
-                let first = from - low + UVec3::new(0, number % dims.y, number / dims.y);
-                values[grid.index_of(first) as usize..][..row.len()].copy_from_slice(row);
-            }
+        let mut all = Voxels::filled(&*self.of.store, grid.dims.element_product(), f32::NAN);
+        for Piece { chunk, low: from, dims, voxels, bytes } in pieces {
+            all.range = union(all.range, voxels.range);
+            let first = |row: u32| grid.index_of(from - low + UVec3::new(0, row % dims.y, row / dims.y)) as usize;
+            put(&voxels.values, dims.x, &mut all.values, first);
+            put(&voxels.colors, dims.x, &mut all.colors, first);
             if let Some(bytes) = bytes.filter(|_| self.read.insert(chunk)) {
                 self.bytes_read += bytes;
             }
         }
-        Ok(values)
+        Ok(all)
     }
 
     /// Reads the part of a chunk that lies in a box.
@@ -231,14 +255,21 @@ impl<'a> LevelChunks<'a> {
         let (StreamedLevel { store, level, .. }, side) = (self.of, self.level.chunk);
         let low = within.low.max(chunk * side);
         let dims = within.end.min((chunk + 1) * side) - low;
-        let mut values = vec![store.fill(); dims.element_product() as usize];
-        if !store.contains(*level, chunk)? {
-            return Ok(Piece { chunk, low, dims, values, bytes: None });
+        let mut voxels = Voxels::filled(&**store, dims.element_product(), store.fill());
+        let bytes =
+            if store.contains(*level, chunk)? { Some(self.fill((chunk, low, dims), &mut voxels)?) } else { None };
+        voxels.range = finite_range(&voxels.values);
+        Ok(Piece { chunk, low, dims, voxels, bytes })
+    }
+
+    /// Fills in the part of a chunk of the store that has a first voxel and voxels along each axis, and returns the bytes of the store that were read.
+    fn fill(&self, (chunk, low, dims): (UVec3, UVec3, UVec3), voxels: &mut Voxels) -> Result<u64, VolumeError> {
+        let (StreamedLevel { store, level, .. }, side) = (self.of, self.level.chunk);
+        let Voxels { values, colors, .. } = voxels;
+        if store.has_colors() {
+            return store.read_colors(*level, low, dims, values, colors);
         }
-        let Some(kept) = &self.kept else {
-            let bytes = Some(store.read(*level, low, dims, &mut values)?);
-            return Ok(Piece { chunk, low, dims, values, bytes });
-        };
+        let Some(kept) = &self.kept else { return store.read(*level, low, dims, values) };
         let first = chunk * side;
         let whole = self.level.grid.part(first, self.level.grid.dims.min(first + side) - first);
         let (decoded, bytes) = match kept.get(chunk) {
@@ -258,7 +289,14 @@ impl<'a> LevelChunks<'a> {
             let own = decoded.as_slice().slice(at..at + row.len());
             row.iter_mut().zip(own.iter()).for_each(|(to, value)| *to = value);
         }
-        Ok(Piece { chunk, low, dims, values, bytes: Some(bytes) })
+        Ok(bytes)
+    }
+}
+
+/// Puts rows of some length where their first voxels are; there may be none.
+fn put<T: Copy>(rows: &[T], length: u32, to: &mut [T], first: impl Fn(u32) -> usize) {
+    for (row, number) in rows.chunks_exact(length as usize).zip(0..) {
+        to[first(number)..][..row.len()].copy_from_slice(row);
     }
 }
 
