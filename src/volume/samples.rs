@@ -126,16 +126,16 @@ sample_types!(
     F64: f64 = "float64"
 );
 
-fn append<S: Sample, T: Voxel>(
-    samples: impl ExactSizeIterator<Item = S> + Clone,
-    into: &mut Vec<T>,
-) -> Result<(), f64> {
-    let voxel = |sample| T::of(sample);
-    let forbidden = samples.clone().position(|sample| voxel(sample).is_none());
-    let allowed = samples.clone().take(forbidden.unwrap_or(samples.len()));
-    into.extend(allowed.map(|sample| voxel(sample).unwrap_or(T::HOLE)));
-    let forbidden = forbidden.and_then(|at| samples.clone().nth(at));
-    forbidden.map_or(Ok(()), |sample| Err(sample.to_f64()))
+fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S>, into: &mut Vec<T>) -> Result<(), f64> {
+    if T::HOLDS_ALL {
+        // Without a test of each, several are converted at a time.
+        into.extend(samples.map(|sample| T::of(sample).unwrap_or(T::HOLE)));
+        return Ok(());
+    }
+    for sample in samples {
+        into.push(T::of(sample).ok_or_else(|| sample.to_f64())?);
+    }
+    Ok(())
 }
 
 /// What a header says about the samples, one per voxel of the grid.

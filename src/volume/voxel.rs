@@ -117,6 +117,9 @@ pub(crate) trait Voxel: Copy + Send + Sync {
     /// A voxel without a sample in the file.
     const HOLE: Self;
 
+    /// Whether every sample is allowed.
+    const HOLDS_ALL: bool;
+
     /// The voxel for a sample; `None` if the sample is not allowed.
     fn of(sample: impl Sample) -> Option<Self>;
 
@@ -133,6 +136,7 @@ impl Voxel for f32 {
 
     const ALLOWED: &'static str = "numbers";
     const HOLE: Self = Self::NAN;
+    const HOLDS_ALL: bool = true;
 
     fn of(sample: impl Sample) -> Option<Self> {
         Some(sample.to_f32())
@@ -154,6 +158,7 @@ impl Voxel for u16 {
 
     const ALLOWED: &'static str = "labels, whole numbers from 0 to 65535";
     const HOLE: Self = 0;
+    const HOLDS_ALL: bool = false;
 
     fn of(sample: impl Sample) -> Option<Self> {
         let sample = sample.to_f64();
