@@ -282,8 +282,8 @@ pub(super) struct Outputs {
     pub(super) has_extremes: bool,
 }
 
-/// Draws the tiles of a region of an image on all cores by `draw_tile`, which gets a walk that no other tile uses meanwhile, the tile's first pixel and its bricks: the
-/// region's pixels, first hits if they are requested, and counts of the work.
+/// Draws the tiles of a region of an image on all cores by `draw_tile`, which gets a walk that no other tile uses meanwhile, the tile's first pixel and
+/// its bricks. Returns the region's pixels, first hits if they are requested, and counts of the work.
 pub(super) fn draw_tiles<W: Send>(
     (size, region): ([u32; 2], &Region),
     Outputs { has_hits, has_extremes }: Outputs,

@@ -293,7 +293,7 @@ impl<'a> LevelChunks<'a> {
     }
 }
 
-/// Puts rows of some length where their first voxels are; there may be none.
+/// Copies rows, each of `length` voxels, to where `first` tells that the row of a number begins. Of voxels without colours there are no rows.
 fn put<T: Copy>(rows: &[T], length: u32, to: &mut [T], first: impl Fn(u32) -> usize) {
     for (row, number) in rows.chunks_exact(length as usize).zip(0..) {
         to[first(number)..][..row.len()].copy_from_slice(row);

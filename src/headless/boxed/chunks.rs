@@ -87,13 +87,12 @@ impl<'a> Chunks<'a> {
         }
     }
 
-    /// The time that the first step in which slabs behind a region are drawn takes for each slab, as a number of voxels; infinite where those of the first slab
-    /// do not fit into memory.
-    pub(super) fn voxels_per_slab(&self, region: &Region, slabs: Range<i32>) -> f64 {
-        let Some((step, needed)) = self.deepest(region, slabs) else { return f64::INFINITY };
+    /// The time that a step takes for each of its slabs, as a number of voxels that are read in it; infinite if not even the voxels of one slab fit into memory.
+    pub(super) fn voxels_per_slab(&self, step: Option<&Step>) -> f64 {
+        let Some((slabs, needed)) = step else { return f64::INFINITY };
         let a_step = self.budget() / self.voxel_bytes().max(1) / STEP_SHARE;
         let voxels = needed.map_or(0, |needed| needed.voxels() + a_step);
-        voxels as f64 / f64::from(step.end - step.start)
+        voxels as f64 / f64::from(slabs.end - slabs.start)
     }
 
     /// The smallest box with all voxels that can change a pixel of a region in some slabs; `None` if no voxel can.

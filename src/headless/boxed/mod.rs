@@ -184,11 +184,12 @@ impl Walk<'_> {
 
     /// The first step in which slabs behind a region are drawn; `None` if its quarters are to be drawn instead.
     fn step(&self, region: &Region, quarters: &[Region], slabs: &Range<i32>) -> Option<Step> {
-        let whole = self.chunks.voxels_per_slab(region, slabs.clone());
-        let of_quarters = quarters.iter().map(|quarter| self.chunks.voxels_per_slab(quarter, slabs.clone()));
+        let whole = self.chunks.deepest(region, slabs.clone());
+        let time = |step: &Option<Step>| self.chunks.voxels_per_slab(step.as_ref());
+        let of_quarters = quarters.iter().map(|quarter| time(&self.chunks.deepest(quarter, slabs.clone())));
         // A flat box around what an oblique region sees is mostly empty of it.
-        let is_divided = quarters.len() > 1 && of_quarters.sum::<f64>() < DIVIDED * whole;
-        if is_divided { None } else { self.chunks.deepest(region, slabs.clone()) }
+        let is_divided = quarters.len() > 1 && of_quarters.sum::<f64>() < DIVIDED * time(&whole);
+        whole.filter(|_| !is_divided)
     }
 
     /// Draws a window from the voxels that it needs, behind what its region shows already.
