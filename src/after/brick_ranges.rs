@@ -4,7 +4,7 @@
 //! maximum of all coefficients within two radii of it; and a slab's values lie between those of its two planes. A brick can therefore be left
 //! out if no value between the minimum and maximum of all coefficients within two radii and a slab of it has an opacity: every slab that it affects
 //! stays transparent without it, whatever values the other bricks then give there. The test needs only the minimum and maximum, which no
-//! change of the transfer function changes.
+//! change of the transfer function changes. Of the bricks that are left, [`shown_voxels`](super::shown_voxels) leaves out voxels.
 
 use glam::UVec3;
 
@@ -83,14 +83,17 @@ impl BrickRanges {
 
     /// Whether each brick may be drawn.
     pub fn shown(&self, volume: &Volume, transfer: &TransferFunction, bearing: Bearing) -> Vec<bool> {
-        let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
-        let tables = labels.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
-        let values = tables.fold(ValueSet::default(), |all, tables| all.union(&values_between(&tables)));
+        let values = values_of(volume, transfer);
         let is_shown = |&[min, max]: &[f32; 2]| {
             let [low, high] = bearing.range([min, max]);
             min <= max && values.meets(low, high)
         };
         self.ranges.par_iter().map(is_shown).collect()
+    }
+
+    /// The minimum and maximum of all coefficients.
+    pub fn all(&self) -> [f32; 2] {
+        self.ranges.iter().fold(EMPTY, |all, &range| union(all, range))
     }
 
     /// The bricks that are wanted, without holes.
@@ -108,11 +111,13 @@ impl BrickRanges {
             }
         })
     }
+}
 
-    /// Their voxels, brick by brick.
-    pub fn voxels(&self, volume: &Volume, is_wanted: impl Fn(usize) -> bool + Sync) -> Vec<u32> {
-        self.brick_list(volume, is_wanted).voxels()
-    }
+/// The values that can take part under any of a transfer function's tables.
+pub(super) fn values_of(volume: &Volume, transfer: &TransferFunction) -> ValueSet {
+    let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
+    let tables = labels.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
+    tables.fold(ValueSet::default(), |all, tables| all.union(&values_between(&tables)))
 }
 
 /// The values that can take part under some tables, with the `f32`s around the ends of iso-ranges: a field passes through values that no voxel has.
@@ -188,7 +193,7 @@ mod tests {
         let ranges = BrickRanges::new(&grid, volume.values(), UVec3::splat(5));
         let shown = ranges.shown(&volume, &transfer, Bearing::Own);
         assert_eq!(shown, [false, true, true, true, true, false]);
-        assert_eq!(ranges.voxels(&volume, |brick| shown[brick]).len(), 4 * 64);
+        assert_eq!(ranges.brick_list(&volume, |brick| shown[brick]).voxels().len(), 4 * 64);
         // A maximum of 100 hides the peak, a minimum of 0 too, and both are in averages.
         assert_eq!(ranges.shown(&volume, &transfer, Bearing::Greater), [false, true, true, true, true, true]);
         assert_eq!(ranges.shown(&volume, &transfer, Bearing::Smaller), [true, true, true, true, true, false]);

@@ -3,4 +3,6 @@
 pub mod brick_ranges;
 pub mod coefficients;
 pub mod normalization;
+pub mod shown_voxels;
 pub mod slab_integral;
+mod spheres;

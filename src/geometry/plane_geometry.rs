@@ -10,6 +10,18 @@ use glam::{DMat2, DMat3, DVec2, DVec3, UVec3};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::volume::Grid;
 
+/// The radius in voxels up to which voxels are told apart by spheres around them, whose cost grows with their sections.
+const WIDEST: f64 = 16.0;
+
+/// How far voxels are from each other that affect the same slabs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reach {
+    /// Along each axis, in whole voxels.
+    pub along: UVec3,
+    /// The greatest square of their distance in voxels; nothing where kernels are very wide.
+    pub squared: Option<u32>,
+}
+
 /// The planes of a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlaneGeometry {
@@ -97,11 +109,17 @@ impl PlaneGeometry {
         footprint + self.radius * (step + farthest * self.step.z) / from_eye
     }
 
-    /// The distance from a brick, in whole voxels along each axis, of the voxels that affect the same slabs: two kernel radii, widened as on the
-    /// farthest plane that meets the volume, and a slab.
-    pub fn reach(&self, view: &ViewGeometry) -> UVec3 {
-        // Rounding must not lose a voxel.
-        whole(2.0 * self.widest_half_box(view) + self.slab_step(view) + 1e-9)
+    /// How far voxels are that affect the same slabs: two kernel radii, widened as on the farthest plane that meets the volume, and a slab.
+    pub fn reach(&self, view: &ViewGeometry) -> Reach {
+        let slab_step = self.slab_step(view);
+        let widest = (self.per_pixel * self.farthest(view)).max_element().max(1.0);
+        let radius = 2.0 * self.radius * widest + slab_step.length();
+        Reach {
+            // Rounding must not lose a voxel.
+            along: whole(2.0 * self.widest_half_box(view) + slab_step + 1e-9),
+            // Kernels end before their radius.
+            squared: (radius <= WIDEST).then(|| (radius * radius - 1e-6).ceil() as u32 - 1),
+        }
     }
 
     /// The distance from a brick, in whole voxels along each axis, of the voxels that affect the values of a slab whose near plane a pixel's ray
@@ -113,16 +131,22 @@ impl PlaneGeometry {
 
     /// Half the box around the voxels whose kernels reach a point, on the farthest plane that meets the volume.
     pub fn widest_half_box(&self, view: &ViewGeometry) -> DVec3 {
+        self.half_box(self.farthest(view))
+    }
+
+    /// The depth from the eye of the farthest plane that meets the volume.
+    fn farthest(&self, view: &ViewGeometry) -> f64 {
         let center = self.grid.center();
         let row = view.screen_from_voxel[2];
         let farthest = row.dot(center.extend(1.0)) + row.truncate().abs().dot(center) + view.reach + view.slabs.width;
-        self.half_box(self.distance_from_eye(farthest))
+        self.distance_from_eye(farthest)
     }
 
     /// The longest step from plane to plane on any pixel's ray, in voxels along each axis.
     pub fn slab_step(&self, view: &ViewGeometry) -> DVec3 {
         let rays = view.rays();
-        let half = DVec2::from(view.size.map(f64::from)) / 2.0;
+        // To the centres of the outermost pixels.
+        let half = (DVec2::from(view.size.map(f64::from)) - 1.0) / 2.0;
         let corners = [DVec2::ONE, DVec2::NEG_X + DVec2::Y, DVec2::X + DVec2::NEG_Y, DVec2::NEG_ONE].map(|corner| {
             let place = corner * half;
             (rays.at(place, 1.0) - rays.at(place, 0.0)).abs()

@@ -12,7 +12,7 @@ use crate::gpu::brick_lists::{BrickLists, SettledBricks};
 use crate::gpu::counts::{GroupSlabs, Totals};
 use crate::gpu::gpu_volume::GpuVolume;
 use crate::gpu::ramps::Stored;
-use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks, ShownInChannel};
+use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks};
 use crate::gpu::volume_texture::OwnColors;
 use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
@@ -163,9 +163,8 @@ impl ClassifiedVolume {
         }
         let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
         let volume = Arc::clone(self.volume());
-        for ((list, channel), of) in self.lists.iter_mut().zip(volume.channels()).zip(&shown.channels) {
-            list.replace(of.brick_list(channel));
-        }
+        let lists = shown.lists(&volume, &self.transfer);
+        self.lists.iter_mut().zip(lists).for_each(|(old, new)| old.replace(new));
         self.revision += 1;
         self.shown = Some(shown);
     }
@@ -175,9 +174,8 @@ impl ClassifiedVolume {
         match needs {
             Some(needs) if self.shown.as_ref().is_none_or(|shown| shown.needs != *needs) => {
                 let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
-                let bricks =
-                    |(channel, of): (&Volume, &ShownInChannel)| SettledBricks::of(limits, of.brick_list(channel));
-                self.volume().channels().zip(&shown.channels).map(bricks).collect()
+                let lists = shown.lists(self.volume(), &self.transfer);
+                lists.into_iter().map(|bricks| SettledBricks::of(limits, bricks)).collect()
             }
             _ => self.lists.iter().map(|list| list.settled(limits)).collect(),
         }
@@ -325,19 +323,10 @@ impl ClassifiedVolume {
 
     /// Lets bricks enter and leave that must.
     fn look_at_bricks(&mut self) -> Touched {
-        let Some(mut shown) = self.shown.take() else { return Touched::default() };
-        let volume = Arc::clone(self.volume());
-        let bearing = shown.needs.bearing;
-        let changes: Vec<(Vec<u32>, Vec<u32>)> = (channels(&volume, &self.transfer).zip(&mut shown.channels))
-            .map(|((channel, transfer), of)| {
-                let new = of.ranges.shown(channel, transfer, bearing);
-                let old = std::mem::replace(&mut of.are_shown, new);
-                let new = &of.are_shown;
-                let entering = of.ranges.voxels(channel, |brick| new[brick] && !old[brick]);
-                (entering, of.ranges.voxels(channel, |brick| old[brick] && !new[brick]))
-            })
-            .collect();
-        self.shown = Some(shown);
+        let Some(shown) = &self.shown else { return Touched::default() };
+        let lists = shown.lists(self.volume(), &self.transfer);
+        let changes: Vec<(Vec<u32>, Vec<u32>)> =
+            self.lists.iter().zip(lists).map(|(old, new)| old.list().changes_to(&new)).collect();
         self.change_all(&changes)
     }
 

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use glam::UVec3;
-
 use crate::after::brick_ranges::{Bearing, BrickRanges};
+use crate::after::shown_voxels::shown_voxels;
+use crate::geometry::plane_geometry::Reach;
 use crate::gpu::coefficients::Coefficients;
 use crate::lists::brick::BrickList;
 use crate::lists::classify::channels;
@@ -17,22 +17,14 @@ pub(super) struct ShownBricks {
     /// What they were found for.
     pub(super) needs: BrickNeeds,
     /// For every channel that is drawn.
-    pub(super) channels: Vec<ShownInChannel>,
-}
-
-/// The bricks that may be drawn in one channel.
-#[derive(Debug)]
-pub(super) struct ShownInChannel {
-    pub(super) ranges: BrickRanges,
-    /// Whether each brick of the grid is drawn.
-    pub(super) are_shown: Vec<bool>,
+    ranges: Vec<BrickRanges>,
 }
 
 /// What decides, beside the transfer function, which bricks may be drawn.
 #[derive(Clone, Debug)]
 pub(crate) struct BrickNeeds {
-    /// How far from a brick voxels bear on what it shows.
-    pub(crate) reach: UVec3,
+    /// How far from a voxel others bear on what it shows.
+    pub(crate) reach: Reach,
     /// Those of each channel, where they are not the values.
     pub(crate) coefficients: Option<Vec<Arc<Coefficients>>>,
     /// Which values bear on the image.
@@ -51,19 +43,28 @@ impl PartialEq for BrickNeeds {
 
 impl ShownBricks {
     pub(super) fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
-        let of_channel = |(number, (channel, transfer)): (usize, (&Volume, &TransferFunction))| {
-            let exact = needs.coefficients.as_ref().map(|all| ValueSlice::from(&*all[number].values));
-            let ranges = BrickRanges::new(channel.grid(), exact.unwrap_or(channel.values()), needs.reach);
-            ShownInChannel { are_shown: ranges.shown(channel, transfer, needs.bearing), ranges }
+        let ranges = |(number, (channel, _)): (usize, (&Volume, &TransferFunction))| {
+            BrickRanges::new(channel.grid(), needs.of_channel(number, channel), needs.reach.along)
         };
-        Self { needs: needs.clone(), channels: channels(volume, transfer).enumerate().map(of_channel).collect() }
+        let ranges = channels(volume, transfer).enumerate().map(ranges).collect();
+        Self { needs: needs.clone(), ranges }
+    }
+
+    /// The voxels of each channel that may be drawn under a transfer function.
+    pub(super) fn lists(&self, volume: &Volume, transfer: &TransferFunction) -> Vec<BrickList> {
+        let Self { needs, ranges } = self;
+        let list = |(number, (channel, transfer)): (usize, (&Volume, &TransferFunction))| {
+            let coefficients = needs.of_channel(number, channel);
+            shown_voxels((&ranges[number], &needs.reach), (channel, coefficients), transfer, needs.bearing)
+        };
+        channels(volume, transfer).enumerate().map(list).collect()
     }
 }
 
-impl ShownInChannel {
-    /// These bricks, without holes.
-    pub(super) fn brick_list(&self, channel: &Volume) -> BrickList {
-        let are_shown = &self.are_shown;
-        self.ranges.brick_list(channel, |brick| are_shown[brick])
+impl BrickNeeds {
+    /// The coefficients of a channel.
+    fn of_channel<'a>(&'a self, number: usize, channel: &'a Volume) -> ValueSlice<'a> {
+        let exact = self.coefficients.as_ref().map(|all| ValueSlice::from(&*all[number].values));
+        exact.unwrap_or(channel.values())
     }
 }

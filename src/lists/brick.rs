@@ -103,6 +103,23 @@ impl BrickList {
         (number != NONE).then(|| number * BRICK_VOXELS + slot_of(&self.grid, voxel))
     }
 
+    /// The voxels of another list of the same grid that are not in this one, and those of this one that are not in the other.
+    pub fn changes_to(&self, new: &Self) -> (Vec<u32>, Vec<u32>) {
+        (new.without(self), self.without(new))
+    }
+
+    /// The voxels that are not in another list.
+    fn without(&self, other: &Self) -> Vec<u32> {
+        let rest = |brick: &Brick| {
+            let number = other.numbers[brick_of(&self.grid, self.grid.index_of(origin(brick))) as usize];
+            let others = if number == NONE { 0 } else { present(&other.bricks[number as usize]) };
+            let [low, high] = [others as u32, (others >> 32) as u32];
+            Brick { present: [brick.present[0] & !low, brick.present[1] & !high], ..*brick }
+        };
+        let voxels = |brick: Brick| voxels(&brick).map(|(_, voxel)| self.grid.index_of(voxel)).collect::<Vec<_>>();
+        self.bricks.iter().map(rest).flat_map(voxels).collect()
+    }
+
     /// Whether a voxel is in the list.
     pub fn contains(&self, voxel: u32) -> bool {
         self.place(voxel)
@@ -223,4 +240,27 @@ pub(super) fn fit(brick: &mut Brick) {
     let [(x, to_x), (y, to_y), (z, to_z)] = bounds;
     (brick.x, brick.y, brick.z) = (origin(brick.x, x), origin(brick.y, y), origin(brick.z, z));
     brick.extent = (to_x - x) | (to_y - y) << 2 | (to_z - z) << 4;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Between lists whose bricks are others, too.
+    #[test]
+    fn changes_turn_a_list_into_another() {
+        let grid = Grid::new(UVec3::new(13, 9, 6), DVec3::ONE);
+        let list = |of: &dyn Fn(u32) -> bool| {
+            let voxels = (0..grid.dims.element_product()).filter(|&index| of(index));
+            BrickList::new(&grid, &voxels.collect::<Vec<_>>())
+        };
+        let (old, new) = (list(&|index| index % 5 < 2 && index < 600), list(&|index| index % 3 < 1 && index > 100));
+        let (entering, leaving) = old.changes_to(&new);
+        assert!(entering.iter().all(|&voxel| new.contains(voxel) && !old.contains(voxel)));
+        assert!(leaving.iter().all(|&voxel| old.contains(voxel) && !new.contains(voxel)));
+        let mut changed = old.clone();
+        changed.change(&entering, &leaving);
+        assert_eq!(changed.compacted(), new);
+        assert_eq!(changed.changes_to(&new), (Vec::new(), Vec::new()));
+    }
 }

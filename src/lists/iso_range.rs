@@ -25,7 +25,7 @@ pub fn of_ordinal(ordinal: u32) -> f32 {
 }
 
 /// Above the ordinals of all finite values, and below that of a hole.
-const END: u32 = f32::INFINITY.to_bits() | 1 << 31;
+pub const END: u32 = f32::INFINITY.to_bits() | 1 << 31;
 
 /// The ordinal of the smallest `f32` that is at least `x`.
 fn at_least(x: f64) -> u32 {

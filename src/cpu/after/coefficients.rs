@@ -13,12 +13,12 @@ use super::slab_integral::Integrals;
 use crate::after::brick_ranges::{Bearing, BrickRanges};
 use crate::after::coefficients;
 use crate::after::normalization::Normalization;
+use crate::after::shown_voxels::shown_voxels;
 use crate::error::RenderError;
-use crate::geometry::plane_geometry::PlaneGeometry;
+use crate::geometry::plane_geometry::{PlaneGeometry, Reach};
 use crate::geometry::view_geometry::ViewGeometry;
 
-use crate::lists::brick::Brick;
-use crate::lists::brick::BrickList;
+use crate::lists::brick::{self, Brick, BrickList};
 use crate::scene::Scene;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Compositing, Interpolation};
@@ -60,8 +60,8 @@ enum Kept {
 /// The minimum and maximum coefficients around bricks, which change with the view, but with no transfer function.
 #[derive(Clone, Debug)]
 struct Ranges {
-    /// The distances in voxels up to which they examined the values around bricks.
-    reaches: [UVec3; 2],
+    /// How far the values around voxels and bricks were examined.
+    reaches: (Reach, UVec3),
     /// Around the kernels of the bricks' voxels.
     of_kernels: BrickRanges,
     /// Around slabs whose near planes rays meet in the cells of the bricks' voxels.
@@ -71,9 +71,7 @@ struct Ranges {
 /// The choice of bricks.
 #[derive(Clone, Debug)]
 struct Shown {
-    /// Whether each brick of the grid is among `bricks`.
-    are_shown: Vec<bool>,
-    /// The bricks whose voxels may affect a slab with an opacity.
+    /// The voxels that may affect a slab with an opacity.
     bricks: BrickList,
     /// The bricks of the grid in whose cells a ray may meet the near plane of a slab with an opacity.
     wanted: Vec<u32>,
@@ -157,7 +155,7 @@ impl Coefficients {
         view: &ViewGeometry,
     ) {
         let (geometry, grid) = (PlaneGeometry::new(view, volume.grid()), volume.grid());
-        let reaches = [geometry.reach(view), geometry.reach_from_cells(view)];
+        let reaches = (geometry.reach(view), geometry.reach_from_cells(view));
         let is_stale = std::mem::take(&mut self.is_stale);
         let kept = self.ranges.take().filter(|ranges| ranges.reaches == reaches);
         if kept.is_some() && self.shown.is_some() && !is_stale {
@@ -165,18 +163,18 @@ impl Coefficients {
             return;
         }
         let ranges = kept.unwrap_or_else(|| {
-            let [of_kernels, of_cells] = reaches.map(|reach| BrickRanges::new(grid, self.all(volume), reach));
+            let [of_kernels, of_cells] =
+                [reaches.0.along, reaches.1].map(|reach| BrickRanges::new(grid, self.all(volume), reach));
             Ranges { reaches, of_kernels, of_cells }
         });
         let bearing = Bearing::of(compositing);
-        let are_shown = ranges.of_kernels.shown(volume, transfer, bearing);
-        let bricks = match self.shown.take() {
-            Some(old) if old.are_shown == are_shown => old.bricks,
-            _ => ranges.of_kernels.brick_list(volume, |brick| are_shown[brick]),
-        };
+        let of_kernels = (&ranges.of_kernels, &ranges.reaches.0);
+        let bricks = shown_voxels(of_kernels, (volume, self.all(volume)), transfer, bearing);
+        // A frame of the same bricks finds them where they were.
+        let bricks = self.shown.take().map(|old| old.bricks).filter(|old| *old == bricks).unwrap_or(bricks);
         let is_wanted = match is_choice(compositing) {
             // A value without an opacity may be chosen.
-            true => vec![true; are_shown.len()],
+            true => vec![true; brick::bricks_per_axis(grid).element_product() as usize],
             false => ranges.of_cells.shown(volume, transfer, bearing),
         };
         let wanted = (0..is_wanted.len() as u32).filter(|&brick| is_wanted[brick as usize]).collect();
@@ -185,7 +183,7 @@ impl Coefficients {
             Cells::new(grid, self.all(volume), &self.numbers, geometry.widest_half_box(view), shown, Work::Shared)
         });
         self.ranges = Some(ranges);
-        self.shown = Some(Shown { are_shown, bricks, wanted, cells });
+        self.shown = Some(Shown { bricks, wanted, cells });
     }
 
     /// For the last view that was looked at, the bricks whose voxels may affect a slab with an opacity.

@@ -55,7 +55,7 @@ impl<'a> Chunks<'a> {
     pub(super) fn new(volume: &'a StreamedVolume, scene: &Scene, view: &ViewGeometry) -> Result<Self, RenderError> {
         let is_after = scene.splatting.classification == Classification::After;
         let geometry = PlaneGeometry::new(view, volume.grid());
-        let reach = if is_after { geometry.reach(view) } else { UVec3::ZERO };
+        let reach = if is_after { geometry.reach(view).along } else { UVec3::ZERO };
         let transfer = scene.resolve(&volume.sample);
         let stores = volume.channels().map(|channel| 1 + u64::from(channel.labels.is_some())).sum::<u64>();
         let kept = volume.memory / SHARE / stores;

@@ -1,8 +1,8 @@
 //! The counts of a frame with classification after splatting (SPEC §§8, 9).
 //!
-//! A brick of 4×4×4 voxels may be drawn if the values around it can have an opacity above 0. These values are the coefficients of all
-//! voxels within two kernel radii (as widened by the low-pass rule) and a slab. A slab needs both of its planes, and each plane all of
-//! its voxels.
+//! A voxel may be drawn if the values around it can have an opacity above 0. These values lie between the coefficients of all voxels within two kernel
+//! radii (as widened by the low-pass rule) and a slab: of all in such a box around its brick of 4×4×4 voxels, and of all that are nearer to itself.
+//! A slab needs both of its planes, and each plane all of its voxels.
 
 use glam::{DVec3, UVec2, UVec3};
 
@@ -22,6 +22,20 @@ use crate::volume::Volume;
 /// The side of a brick in voxels.
 const SIDE: u32 = 4;
 
+/// The distance in voxels up to which voxels are told apart; where kernels reach farther, all of a brick may be drawn.
+const WIDEST: f64 = 16.0;
+
+/// The difference of two distances' squares that rounding may be.
+const ROUNDING: f64 = 1e-6;
+
+/// How far voxels are from each other that affect the same slabs, in voxels.
+struct Reach {
+    /// Along each axis.
+    along: DVec3,
+    /// In all; nearer ones do.
+    distance: f64,
+}
+
 /// The counts of the frame that [`super::render_for`] draws.
 ///
 /// # Errors
@@ -33,18 +47,13 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
 /// The counts of the frames of all channels, each of whose fields is drawn by itself. No voxel is shaded, because pixels are shaded instead.
 pub(super) fn count_in(frames: &[Frame]) -> Counts {
     let frame = &frames[0];
-    // The numbers of voxels, and of sections, in a brick. Holes are not drawn.
-    let of_brick = |frame: &Frame, &[first, end]: &[UVec3; 2]| {
-        let voxels = (first.z..end.z)
-            .flat_map(|z| (first.y..end.y).flat_map(move |y| (first.x..end.x).map(move |x| UVec3::new(x, y, z))))
-            .filter(|voxel| !frame.volume.value(*voxel).is_nan());
-        voxels.fold([0, 0], |[count, sections], voxel| [count + 1, sections + planes(frame, voxel)])
-    };
-    let drawn: Vec<Vec<[UVec3; 2]>> = frames.iter().map(drawn_bricks).collect();
-    let pairs: Vec<(&Frame, &[UVec3; 2])> =
-        frames.iter().zip(&drawn).flat_map(|(frame, bricks)| bricks.iter().map(move |brick| (frame, brick))).collect();
-    let counts = pairs.par_iter().map(|(frame, brick)| of_brick(frame, brick));
-    let [voxels, sections] = counts.reduce(|| [0, 0], |a, b| [a[0] + b[0], a[1] + b[1]]);
+    let drawn: Vec<Vec<Vec<UVec3>>> = frames.iter().map(drawn_bricks).collect();
+    let pairs = frames.iter().zip(&drawn).flat_map(|(frame, bricks)| bricks.iter().map(move |brick| (frame, brick)));
+    let counts = pairs.map(|(frame, brick)| {
+        let sections = brick.iter().map(|voxel| planes(frame, *voxel)).sum();
+        [brick.len() as u64, sections]
+    });
+    let [voxels, sections] = counts.fold([0, 0], |a, b: [u64; 2]| [a[0] + b[0], a[1] + b[1]]);
     let sheets = sheets(frame, &drawn.concat());
     let [columns, rows] = tile_grid([frame.scene.image.width, frame.scene.image.height]).map(u64::from);
     Counts {
@@ -59,37 +68,51 @@ pub(super) fn count_in(frames: &[Frame]) -> Counts {
     }
 }
 
-/// The bricks of a channel that may be drawn, as their first voxels and the ends behind their last ones.
-fn drawn_bricks(frame: &Frame) -> Vec<[UVec3; 2]> {
+/// The voxels of a channel that may be drawn, by brick, without holes.
+fn drawn_bricks(frame: &Frame) -> Vec<Vec<UVec3>> {
     let grid = &frame.geometry.grid;
     let reach = reach(frame);
     let tables = tables(frame);
     let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
-    (0..bricks.element_product())
-        .into_par_iter()
-        .map(|index| UVec3::new(index % bricks.x, index / bricks.x % bricks.y, index / bricks.x / bricks.y) * SIDE)
-        .map(|first| [first, (first + SIDE).min(grid.dims)])
-        .filter(|&[first, end]| {
-            values(frame, first, end, reach).is_some_and(|ends| meets_opacity(&tables, bearing(frame, ends)))
-        })
-        .collect()
+    let in_brick = |index: u32| {
+        let first = UVec3::new(index % bricks.x, index / bricks.x % bricks.y, index / bricks.x / bricks.y) * SIDE;
+        let end = (first + SIDE).min(grid.dims);
+        let shows = |ends: Option<[f64; 2]>| ends.is_some_and(|ends| meets_opacity(&tables, bearing(frame, ends)));
+        if !shows(values(frame, (first, end), reach.along, |_| true)) {
+            return Vec::new();
+        }
+        let is_drawn = |&voxel: &UVec3| {
+            let squared = |other: UVec3| other.as_dvec3().distance_squared(voxel.as_dvec3());
+            let is_near = |other| squared(other) < reach.distance * reach.distance - ROUNDING;
+            let around = || values(frame, (voxel, voxel + 1), DVec3::splat(reach.distance), is_near);
+            !frame.volume.value(voxel).is_nan() && (reach.distance > WIDEST || shows(around()))
+        };
+        voxels(first, end).filter(is_drawn).collect()
+    };
+    let drawn = (0..bricks.element_product()).into_par_iter().map(in_brick);
+    drawn.filter(|brick| !brick.is_empty()).collect()
 }
 
-/// The distance from a brick, in voxels along each axis, of the voxels that affect it.
-fn reach(frame: &Frame) -> DVec3 {
+/// The voxels from one to before another.
+fn voxels(first: UVec3, end: UVec3) -> impl Iterator<Item = UVec3> {
+    (first.z..end.z)
+        .flat_map(move |z| (first.y..end.y).flat_map(move |y| (first.x..end.x).map(move |x| UVec3::new(x, y, z))))
+}
+
+/// How far from a voxel, and from its brick, those are that affect the same slabs.
+fn reach(frame: &Frame) -> Reach {
     let geometry = &frame.geometry;
     let last = geometry.size.as_uvec2() - 1;
     let corners = [last.with_x(0), last.with_y(0), last, UVec2::ZERO].map(|corner| frame.pixel(corner));
     let slab = corners.iter().map(Pixel::step).reduce(DVec3::max).unwrap_or_default();
-    // Kernels are widest where pixels are largest.
-    let farthest = match &geometry.eye {
-        None => 0.0,
-        Some(eye) => {
-            (eye.position.length() + (geometry.grid.center() * geometry.grid.aspect()).length()) / geometry.slab_width
-        }
-    };
-    let rule = frame.low_pass(farthest.ceil() as i32 + 1);
-    2.0 * rule.map_or(DVec3::ZERO, |rule| rule.half_box(geometry.radius)) + slab
+    // Kernels are widest where pixels are largest, on the farthest plane that meets the volume's kernels.
+    let half = geometry.grid.center() * geometry.grid.aspect();
+    let normal = geometry.basis.w;
+    let farthest = geometry.eye.map_or(0.0, |eye| normal.dot(-eye.position) + normal.abs().dot(half));
+    let kernel = geometry.radius * (normal * geometry.grid.aspect()).length();
+    let rule = frame.low_pass_at(farthest + kernel + geometry.slab_width);
+    let (half_box, widest) = rule.map_or((DVec3::ZERO, 1.0), |rule| (rule.half_box(geometry.radius), rule.widest));
+    Reach { along: 2.0 * half_box + slab, distance: 2.0 * widest * geometry.radius + slab.length() }
 }
 
 /// The tables that apply to any voxel.
@@ -99,16 +122,21 @@ fn tables<'a>(frame: &Frame<'a>) -> Vec<Tables<'a>> {
     labels.chain([frame.transfer.tables(None)]).collect()
 }
 
-/// The minimum and maximum of the coefficients within reach of a brick; `None` if there are only holes.
-fn values(frame: &Frame, first: UVec3, end: UVec3, reach: DVec3) -> Option<[f64; 2]> {
+/// The minimum and maximum of the coefficients of those voxels of a box, and up to a distance around it, that count; `None` if there are only holes.
+fn values(
+    frame: &Frame,
+    (first, end): (UVec3, UVec3),
+    reach: DVec3,
+    counts: impl Fn(UVec3) -> bool,
+) -> Option<[f64; 2]> {
     let dims = frame.volume.dims();
     let low = (first.as_dvec3() - reach).ceil().max(DVec3::ZERO).as_uvec3();
     let high = (end.as_dvec3() - 1.0 + reach).floor().min(dims.as_dvec3() - 1.0).as_uvec3();
-    let rows = (low.z..=high.z).flat_map(|z| (low.y..=high.y).map(move |y| dims.x * (y + dims.y * z)));
     let coefficients = frame.field.coefficients();
-    let found = rows.flat_map(|row| &coefficients[(row + low.x) as usize..=(row + high.x) as usize]);
+    let found = voxels(low, high + 1).filter(|&voxel| counts(voxel));
+    let found = found.map(|voxel| coefficients[frame.geometry.grid.index_of(voxel) as usize]);
     // `min` and `max` ignore NaN.
-    let ends = found.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], &c| [min.min(c), max.max(c)]);
+    let ends = found.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], c| [min.min(c), max.max(c)]);
     (ends[0] <= ends[1]).then_some(ends)
 }
 
@@ -141,16 +169,17 @@ fn planes(frame: &Frame, voxel: UVec3) -> u64 {
     (last - first + 1.0).max(0.0) as u64
 }
 
-/// The number of slabs from the first to the last that the cells of some bricks reach.
-fn sheets(frame: &Frame, bricks: &[[UVec3; 2]]) -> u64 {
+/// The number of slabs from the first to the last that the cells of some bricks' voxels reach, in boxes around each brick's.
+fn sheets(frame: &Frame, bricks: &[Vec<UVec3>]) -> u64 {
     let geometry = &frame.geometry;
     let aspect = geometry.grid.aspect();
     let (normal, origin) = match &geometry.eye {
         None => (geometry.ro / aspect, -geometry.grid.place() / geometry.grid.unit()),
         Some(eye) => (geometry.basis.w, eye.position),
     };
-    let depths = bricks.iter().map(|&[first, end]| {
-        let (first, end) = (first.as_dvec3() - 0.5, end.as_dvec3() - 0.5);
+    let depths = bricks.iter().map(|voxels| {
+        let ends = |of: fn(UVec3, UVec3) -> UVec3| voxels.iter().copied().reduce(of).unwrap_or_default().as_dvec3();
+        let (first, end) = (ends(UVec3::min) - 0.5, ends(UVec3::max) + 0.5);
         let middle = ((first + end) / 2.0 - geometry.grid.center()) * aspect;
         let (middle, half) = (normal.dot(middle - origin), normal.abs().dot((end - first) / 2.0 * aspect));
         (middle - half, middle + half)

@@ -13,6 +13,8 @@ pub struct LowPass {
     pub lowered: DMat3,
     /// The inverse of `lowered`.
     widened: DMat3,
+    /// The greatest factor by which kernels are widened.
+    pub widest: f64,
 }
 
 impl LowPass {
@@ -24,7 +26,7 @@ impl LowPass {
         let root = half_difference.hypot(rd);
         let axis = DVec2::from_angle(rd.atan2(half_difference) / 2.0);
         let axes = DMat2::from_cols(axis, axis.perp());
-        let (mut lowered, mut widened) = (DMat3::IDENTITY, DMat3::IDENTITY);
+        let (mut lowered, mut widened, mut widest) = (DMat3::IDENTITY, DMat3::IDENTITY, 1.0);
         for (axis, squared) in [(axes.x_axis, mean + root), (axes.y_axis, mean - root)] {
             if squared > 1.0 {
                 let singular = squared.sqrt();
@@ -32,9 +34,10 @@ impl LowPass {
                 let projection = DMat3::from_cols(left * left.x, left * left.y, left * left.z);
                 lowered -= projection * (1.0 - 1.0 / singular);
                 widened += projection * (singular - 1.0);
+                widest = singular.max(widest);
             }
         }
-        Self { lowered, widened }
+        Self { lowered, widened, widest }
     }
 
     /// Half the box in grid units around the voxels whose kernels, of this radius, reach a point.

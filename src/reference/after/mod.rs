@@ -114,6 +114,11 @@ impl<'a> Frame<'a> {
 
     /// The low-pass rule on a plane; `None` at the eye and behind it.
     pub fn low_pass(&self, plane: i32) -> Option<LowPass> {
+        self.low_pass_at(f64::from(plane) * self.geometry.slab_width)
+    }
+
+    /// The low-pass rule at a sheet depth; `None` at the eye and behind it.
+    fn low_pass_at(&self, depth: f64) -> Option<LowPass> {
         let geometry = &self.geometry;
         let aspect = geometry.grid.aspect();
         let (right, down) = (geometry.basis.u / aspect, -geometry.basis.v / aspect);
@@ -124,7 +129,6 @@ impl<'a> Frame<'a> {
             }
             // Planes are parallel to the image, and therefore to the steps from pixel to pixel.
             Some(eye) => {
-                let depth = f64::from(plane) * geometry.slab_width;
                 let pix = eye.pix(depth);
                 (depth > 0.0).then(|| LowPass::new(right * pix, down * pix))
             }
