@@ -90,23 +90,31 @@ impl PendingCounts {
     /// # Errors
     /// If the device was lost in the meantime.
     pub fn try_get(&self) -> Option<Result<(Counts, StageTimes), RenderError>> {
+        self.arrival.try_recv().ok().map(|result| self.arrived(result))
+    }
+
+    /// The counts of a frame that is done, after the device was polled. Another thread that polled it, too, may still be bringing them.
+    pub(crate) fn get(&self) -> Result<(Counts, StageTimes), RenderError> {
+        let missing = |_| RenderError::Readback("the frame's counts did not arrive".to_owned());
+        self.arrived(self.arrival.recv().map_err(missing)?)
+    }
+
+    fn arrived(&self, result: Result<(), BufferAsyncError>) -> Result<(Counts, StageTimes), RenderError> {
         let failed = |reason: String| RenderError::Readback(reason);
-        let result = self.arrival.try_recv().ok()?;
-        Some(result.map_err(|error| failed(error.to_string())).and_then(|()| {
-            let Staging { buffer, timestamps, stages, period } = &self.staging;
-            let bytes = buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
-            let (counts, times) = bytes.split_at(*timestamps as usize);
-            let mut rest = counts;
-            let mut of_layer = |totals: &Totals| {
-                let (own, others) = rest.split_at(count_bytes(totals.group_sheets.len()) as usize);
-                let (tally, tiles) = own.split_at(size_of::<Tally>());
-                rest = others;
-                totals.count(&bytemuck::pod_read_unaligned(tally), &bytemuck::pod_collect_to_vec(tiles))
-            };
-            let mut layers = self.totals.iter();
-            let mut counts = layers.next().map(&mut of_layer).unwrap_or_default();
-            layers.for_each(|totals| counts.add_channel(&of_layer(totals)));
-            Ok((counts, stage_ms(stages, &bytemuck::pod_collect_to_vec(times), *period)))
-        }))
+        result.map_err(|error| failed(error.to_string()))?;
+        let Staging { buffer, timestamps, stages, period } = &self.staging;
+        let bytes = buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
+        let (counts, times) = bytes.split_at(*timestamps as usize);
+        let mut rest = counts;
+        let mut of_layer = |totals: &Totals| {
+            let (own, others) = rest.split_at(count_bytes(totals.group_sheets.len()) as usize);
+            let (tally, tiles) = own.split_at(size_of::<Tally>());
+            rest = others;
+            totals.count(&bytemuck::pod_read_unaligned(tally), &bytemuck::pod_collect_to_vec(tiles))
+        };
+        let mut layers = self.totals.iter();
+        let mut counts = layers.next().map(&mut of_layer).unwrap_or_default();
+        layers.for_each(|totals| counts.add_channel(&of_layer(totals)));
+        Ok((counts, stage_ms(stages, &bytemuck::pod_collect_to_vec(times), *period)))
     }
 }

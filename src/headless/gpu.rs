@@ -196,11 +196,9 @@ impl GpuHeadless {
                 return Err(Pick::missing(pixel, &view.scene().image).into());
             };
             self.queue.submit([encoder.finish()]);
-            // The first call requests the pick; after waiting it has arrived.
-            let early = pending.try_get();
+            pending.request();
             wait(&self.device)?;
-            let missing = || Err(RenderError::Readback("the pick did not arrive".to_owned()));
-            early.or_else(|| pending.try_get()).unwrap_or_else(missing)
+            pending.get()
         })?
     }
 
@@ -250,8 +248,7 @@ impl GpuHeadless {
         target_bytes: u64,
         [prepare_ms, frame_ms]: [f64; 2],
     ) -> Result<Stats, RenderError> {
-        let missing = || Err(RenderError::Readback("the frame's counts did not arrive".to_owned()));
-        let (counts, stages_ms) = counts.and_then(|counts| counts.try_get()).unwrap_or_else(missing)?;
+        let (counts, stages_ms) = counts.ok_or_else(no_frame)?.get()?;
         let info = self.adapter.get_info();
         let ImageSettings { width, height, .. } = view.scene().image;
         Ok(Stats {

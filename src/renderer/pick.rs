@@ -53,26 +53,43 @@ impl PendingPick {
     /// The picked point, once the encoder was submitted, its work is done, and the device was polled. The first call after submitting requests
     /// it, so at least two calls are needed; until the point has arrived they return `None`. Never waits. The inner `None` means that the
     /// opacity is not reached.
-    /// opacity is not reached.
     ///
     /// # Errors
     /// If the device was lost in the meantime.
     pub fn try_get(&mut self) -> Option<Result<Option<Pick>, RenderError>> {
-        let failed = |reason: String| RenderError::Readback(reason);
-        let arrival = self.arrival.get_or_insert_with(|| {
+        let result = self.requested().try_recv().ok()?;
+        Some(self.arrived(result))
+    }
+
+    /// Requests the point, once the encoder was submitted.
+    pub(crate) fn request(&mut self) {
+        self.requested();
+    }
+
+    /// The point that was requested, after its work is done and the device was polled. Another thread that polled it, too, may still be bringing it.
+    pub(crate) fn get(mut self) -> Result<Option<Pick>, RenderError> {
+        let missing = |_| RenderError::Readback("the pick did not arrive".to_owned());
+        let result = self.requested().recv().map_err(missing)?;
+        self.arrived(result)
+    }
+
+    fn requested(&mut self) -> &Receiver<Result<(), BufferAsyncError>> {
+        self.arrival.get_or_insert_with(|| {
             let (sender, arrival) = channel();
             self.staging.map_async(MapMode::Read, .., move |result| {
                 // The receiver may have been dropped.
                 let _ = sender.send(result);
             });
             arrival
-        });
-        let result = arrival.try_recv().ok()?;
-        Some(result.map_err(|error| failed(error.to_string())).and_then(|()| {
-            let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
-            let depth: f32 = bytemuck::pod_read_unaligned(&bytes[..4]);
-            let of = (&*self.volume, &self.transfer);
-            Ok(depth.is_finite().then(|| Pick::at(&self.view, of, self.pixel, depth.into())))
-        }))
+        })
+    }
+
+    fn arrived(&self, result: Result<(), BufferAsyncError>) -> Result<Option<Pick>, RenderError> {
+        let failed = |reason: String| RenderError::Readback(reason);
+        result.map_err(|error| failed(error.to_string()))?;
+        let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
+        let depth: f32 = bytemuck::pod_read_unaligned(&bytes[..4]);
+        let of = (&*self.volume, &self.transfer);
+        Ok(depth.is_finite().then(|| Pick::at(&self.view, of, self.pixel, depth.into())))
     }
 }
