@@ -149,10 +149,10 @@ fn cuts_equal_the_reference() {
                 scene.splatting.rasterizer = rasterizer;
                 let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
                 let (origin, planes) = ([case % 4, case % 5], [0.01, 1000.0]);
-                let given = depths.as_ref().map(|depths| surfaces(&gpu, &view, unit, range, planes, depths, origin));
+                let given = depths.as_ref().map(|depths| surfaces(gpu, &view, unit, range, planes, depths, origin));
                 scene_view.set_surfaces(given).unwrap();
                 scene_view.set_first_hit(first_hit).unwrap();
-                draw(&gpu, &mut scene_view)
+                draw(gpu, &mut scene_view)
             } else {
                 draw_natively(&volume, &scene, (depths.as_deref(), first_hit))
             };
@@ -196,9 +196,9 @@ fn culling_keeps_its_guarantee() {
                 let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
                 let range = DepthRange::Reversed;
                 scene_view
-                    .set_surfaces(Some(surfaces(&gpu, &view, unit, range, [0.01, 1000.0], &depths, [0, 0])))
+                    .set_surfaces(Some(surfaces(gpu, &view, unit, range, [0.01, 1000.0], &depths, [0, 0])))
                     .unwrap();
-                draw(&gpu, &mut scene_view)
+                draw(gpu, &mut scene_view)
             });
             let allowed = 1.0 - scene.splatting.opacity_threshold + 2e-5;
             let difference = largest_difference(&with.0, &without.0);
@@ -235,9 +235,9 @@ fn walls() {
             let mut scene_view = gpu.view(volume.clone(), &scene).unwrap();
             let planes = [middle - 60.0, middle + 90.0];
             scene_view
-                .set_surfaces(wall.map(|wall| surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &wall, [0, 0])))
+                .set_surfaces(wall.map(|wall| surfaces(gpu, &view, unit, DepthRange::Standard, planes, &wall, [0, 0])))
                 .unwrap();
-            draw(&gpu, &mut scene_view)
+            draw(gpu, &mut scene_view)
         };
         let (none, behind, before, between) = (
             with_wall(None),
@@ -290,7 +290,7 @@ fn cuts_are_exact_along_rays() {
             [&scene, &whole].map(|scene| ray_march::pixels(&volume, &transfer, scene, &pixels).unwrap());
         for drawing in [Drawing::By(Rasterizer::Tiles), Drawing::Native] {
             let [decibels, unclipped] = [(&scene, &marched), (&whole, &marched_whole)].map(|(scene, marched)| {
-                let image = drawing.render(&gpu, &volume, scene).image;
+                let image = drawing.render(gpu, &volume, scene).image;
                 let drawn: Vec<[f32; 4]> = pixels.iter().map(|at| image.pixels[(at.y * 120 + at.x) as usize]).collect();
                 psnr(&drawn, marched, BLACK, 100)
             });
@@ -311,7 +311,7 @@ fn moved_planes_are_fresh_ones() {
     scene.camera.direction = DVec3::new(0.3, 0.8, -0.3);
     scene.camera.projection = Projection::Orthographic { height: Some(260.0) };
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
-    let mut last = draw(&gpu, &mut view).2.voxels_in_range;
+    let mut last = draw(gpu, &mut view).2.voxels_in_range;
     for step in 0..20 {
         scene.clip = if step == 7 { Clip::default() } else { random_clip(&mut random, volume.grid()) };
         let touched = view.set_clip(scene.clip.clone()).unwrap();
@@ -319,13 +319,13 @@ fn moved_planes_are_fresh_ones() {
             scene.splatting.radius = random.pick(&[1.4, 2.0, 3.0]);
             view.set_splatting(scene.splatting).unwrap();
         }
-        let changed = draw(&gpu, &mut view);
+        let changed = draw(gpu, &mut view);
         let count = changed.2.voxels_in_range;
         if step % 5 != 4 {
             assert_eq!(count, last + touched.entered - touched.left, "step {step}");
         }
         last = count;
-        let fresh = draw(&gpu, &mut gpu.view(volume.clone(), &scene).unwrap());
+        let fresh = draw(gpu, &mut gpu.view(volume.clone(), &scene).unwrap());
         assert_eq!(changed, fresh, "step {step}: {:?}", scene.clip);
     }
     // Half a head is left.
@@ -397,7 +397,7 @@ fn unsuitable_surfaces_are_refused() {
         let changed = change(&mut view).map_err(RenderError::from);
         changed.and_then(|()| gpu.draw(&mut view)).map(|rendering| rendering.stats).unwrap_err().to_string()
     };
-    let good = surfaces(&gpu, &seen, unit, DepthRange::Standard, [-99.0, 99.0], &depths, [0, 0]);
+    let good = surfaces(gpu, &seen, unit, DepthRange::Standard, [-99.0, 99.0], &depths, [0, 0]);
     let assert_words = |message: &str, words: &[&str]| {
         words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message}"));
     };

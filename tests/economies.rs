@@ -63,7 +63,7 @@ fn the_twin_economises_alike() {
     for (name, volume, mut scene) in cases() {
         let orthographic = scene.camera.projection;
         let plain = twin(&volume, &scene);
-        let everything = render(&gpu, &volume, &scene).stats.counts.sections_rasterized;
+        let everything = render(gpu, &volume, &scene).stats.counts.sections_rasterized;
         for (projection, compositing, order) in [
             (orthographic, Compositing::Linear, Order::FrontToBack),
             (orthographic, Compositing::Exponential, Order::BackToFront),
@@ -76,7 +76,7 @@ fn the_twin_economises_alike() {
                 scene.camera.projection = projection;
                 (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
                 scene.splatting.experimental = economies;
-                let (ours, expected) = (render(&gpu, &volume, &scene), twin(&volume, &scene));
+                let (ours, expected) = (render(gpu, &volume, &scene), twin(&volume, &scene));
                 let what = format!("{name}, {:?}, {economies:?}", scene.splatting);
                 // A footprint drops to 0 at its rim, so rounding may include or exclude a pixel there.
                 let worst = largest_difference(&ours.image, &expected);
@@ -107,11 +107,11 @@ fn beta_keeps_its_bound() {
             scene.camera.projection = projection;
             scene.splatting.compositing = compositing;
             scene.splatting.experimental = NONE;
-            let plain = render(&gpu, &volume, &scene);
+            let plain = render(gpu, &volume, &scene);
             let mut sections = plain.stats.counts.sections_rasterized;
             for beta in [0.98, 0.9, 0.6, 0.2] {
                 scene.splatting.experimental.beta = beta;
-                let economic = render(&gpu, &volume, &scene);
+                let economic = render(gpu, &volume, &scene);
                 let worst = largest_difference(&economic.image, &plain.image);
                 let what = format_args!("{name}, {projection:?}, {compositing:?}, β {beta}");
                 assert_at_most(worst, 1.0 - beta + 2e-5, what);
@@ -126,9 +126,9 @@ fn beta_keeps_its_bound() {
         }
         // Nothing is hidden.
         scene.splatting.compositing = Compositing::Xray;
-        let with = render(&gpu, &volume, &scene).image;
+        let with = render(gpu, &volume, &scene).image;
         scene.splatting.experimental = NONE;
-        assert_eq!(with, render(&gpu, &volume, &scene).image, "{name}");
+        assert_eq!(with, render(gpu, &volume, &scene).image, "{name}");
     }
     assert!(changed > 12, "β told only {changed} frames from others");
 }

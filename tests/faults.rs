@@ -16,7 +16,7 @@ use sheetsplat::{DeviceFault, scoped};
 use sheetsplat::{GpuVolume, Renderer, RendererOptions, SceneView};
 
 use common::surfaces::{DepthRange, clip_from_world};
-use common::{RASTERIZERS, gpu, scene, transfer};
+use common::{RASTERIZERS, new_gpu, scene, transfer};
 
 fn head() -> (Volume, Scene) {
     let mut scene = scene(60, 50);
@@ -36,7 +36,7 @@ fn a_lost_device_is_an_error_everywhere_and_another_one_renders() {
     for rasterizer in RASTERIZERS {
         let (volume, mut scene) = head();
         scene.splatting.rasterizer = rasterizer;
-        let gpu = gpu();
+        let gpu = new_gpu();
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
         view.set_first_hit(Some(0.1)).unwrap();
         let before = gpu.draw(&mut view).unwrap().image;
@@ -58,7 +58,7 @@ fn a_lost_device_is_an_error_everywhere_and_another_one_renders() {
             other => panic!("{other:?}"),
         }
 
-        let other = common::gpu();
+        let other = new_gpu();
         let mut view = other.view(volume, &scene).unwrap();
         view.set_first_hit(Some(0.1)).unwrap();
         assert!(other.draw(&mut view).unwrap().image == before);
@@ -68,7 +68,7 @@ fn a_lost_device_is_an_error_everywhere_and_another_one_renders() {
 #[test]
 fn objects_of_another_device_are_an_error() {
     let (volume, scene) = head();
-    let [one, other] = [gpu(), gpu()];
+    let [one, other] = [new_gpu(), new_gpu()];
     let mut view = one.view(volume, &scene).unwrap();
     let refused = |result: Result<(), RenderError>| match result {
         Err(RenderError::OutOfRange(error)) if error.key == "device" => error.to_string(),
@@ -87,7 +87,7 @@ fn objects_of_another_device_are_an_error() {
 #[test]
 fn validation_errors_are_returned_and_the_device_goes_on() {
     let (volume, scene) = head();
-    let gpu = gpu();
+    let gpu = new_gpu();
     let mut view = gpu.view(volume, &scene).unwrap();
     let before = gpu.draw(&mut view).unwrap().image;
     let depth = gpu.device().create_texture(&wgpu::TextureDescriptor {
@@ -123,7 +123,7 @@ fn validation_errors_are_returned_and_the_device_goes_on() {
 fn too_large_an_image_is_out_of_memory_and_the_device_goes_on() {
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = Rasterizer::Quads;
-    let gpu = gpu();
+    let gpu = new_gpu();
     let mut view = gpu.view(volume, &scene).unwrap();
     let before = gpu.draw(&mut view).unwrap();
     let small = scene.image;
@@ -151,7 +151,7 @@ fn too_large_an_image_is_out_of_memory_and_the_device_goes_on() {
 /// The device cannot compile a host's shader in the library's error scope. It continues to work.
 #[test]
 fn a_shader_that_does_not_compile_is_an_error_and_the_device_goes_on() {
-    let gpu = gpu();
+    let gpu = new_gpu();
     let descriptor = |source: &'static str| wgpu::ShaderModuleDescriptor {
         label: Some("host.shader"),
         source: wgpu::ShaderSource::Wgsl(source.into()),

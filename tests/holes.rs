@@ -163,7 +163,7 @@ fn frames_equal_the_reference() {
                 };
                 for (variant, drawing, required) in by_gpu.into_iter().chain([(3, Drawing::Native, 110.0)]) {
                     let what = format!("{name}, camera {at}, {compositing:?}, {method:?}, {drawing:?}");
-                    let decibels = decibels(&drawing.render(&gpu, &volume, &scene).image, &expected, &what);
+                    let decibels = decibels(&drawing.render(gpu, &volume, &scene).image, &expected, &what);
                     worst[variant] = worst[variant].min(decibels);
                     assert_at_least(decibels, required, &what);
                 }
@@ -205,7 +205,7 @@ fn a_hole_is_a_hidden_voxel() {
             assert_finite(&twin(&volume, &scene), &what);
             assert!(twin(&volume, &scene) == twin(&filled, &hidden), "{what}: the twin");
             for drawing in DRAWINGS {
-                let (drawn, expected) = (drawing.render(&gpu, &volume, &scene), drawing.render(&gpu, &filled, &hidden));
+                let (drawn, expected) = (drawing.render(gpu, &volume, &scene), drawing.render(gpu, &filled, &hidden));
                 assert_finite(&drawn.image, &what);
                 assert!(drawn.image == expected.image, "{what}, {drawing:?}");
                 assert_eq!(drawn.stats.counts, expected.stats.counts, "{what}, {drawing:?}");

@@ -256,11 +256,11 @@ fn frames_of_labels_equal_the_reference() {
             scene.transfer.labels = tables(&labels).collect();
             scene.splatting.compositing = compositing;
             scene.splatting.order = order;
-            check(&gpu, &format!("{labels:?} {spacing:?} {compositing:?}"), &volume, &scene);
+            check(gpu, &format!("{labels:?} {spacing:?} {compositing:?}"), &volume, &scene);
             // Labels without gradient opacity use the main table's; iso-ranges apply to all.
             scene.transfer.gradient_opacity = ramp(&[(5.0, 0.2), (40.0, 1.0)]);
             scene.transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 230.0]]);
-            check(&gpu, &format!("{labels:?} {spacing:?} {compositing:?}, all tables"), &volume, &scene);
+            check(gpu, &format!("{labels:?} {spacing:?} {compositing:?}, all tables"), &volume, &scene);
         }
     }
 }
@@ -276,7 +276,7 @@ fn labels_in_perspective_equal_the_reference() {
     scene.transfer = transfer(&[(20.0, [0.9, 0.8, 0.3])], &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)]);
     scene.transfer.labels = tables(&labels).collect();
     scene.splatting.compositing = Compositing::Exponential;
-    check(&gpu, "perspective", &segmented(&labels, [1.0, 1.0, 1.6]), &scene);
+    check(gpu, "perspective", &segmented(&labels, [1.0, 1.0, 1.6]), &scene);
 }
 
 /// The same with every kernel composited by itself, which shades as quads do.
@@ -292,7 +292,7 @@ fn labels_of_every_sample_equal_the_reference() {
     scene.splatting.method = Method::CompositeEverySample;
     let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
     for drawing in [Drawing::By(Rasterizer::Quads), Drawing::Native] {
-        let drawn = drawing.render(&gpu, &volume, &scene);
+        let drawn = drawing.render(gpu, &volume, &scene);
         assert_at_most(largest_difference(&drawn.image, &expected), 2.5e-4, format!("every sample {drawing:?}"));
     }
 }
@@ -315,7 +315,7 @@ fn labels_in_several_layers() {
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(100.0, 0.0), (150.0, 0.2)]);
     scene.transfer.labels = tables(&[1, 2, 3]).collect();
     scene.transfer.iso_ranges = Some(vec![[100.0, 300.0]]);
-    check(&gpu, "several layers", &volume, &scene);
+    check(gpu, "several layers", &volume, &scene);
 }
 
 /// If tables only hide voxels, shading needs no labels, and they stay on the CPU.

@@ -52,7 +52,7 @@ fn webgpu_default_limits_and_no_features() {
             (scene.splatting.compositing, scene.splatting.footprint) = (compositing, footprint);
             // Which pixels are opaque depends on the last bit of a sum, so f16 and f32 cull differently.
             scene.splatting.culling = false;
-            let images = [&least, &full].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap().image);
+            let images = [&least, full].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap().image);
             let decibels = compare::decibels(rms(&images[0], &images[1]));
             // On this device sheets are f16, and footprints are drawn by quads.
             assert_at_least(decibels, 52.0, format_args!("{compositing:?} {footprint:?}"));

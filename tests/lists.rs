@@ -67,7 +67,7 @@ fn assert_fresh(gpu: &GpuHeadless, view: &mut SceneView, name: &str) {
 fn a_changed_view_is_a_fresh_one() {
     let gpu = gpu();
     for rasterizer in RASTERIZERS {
-        assert_changes_are_fresh(&gpu, rasterizer);
+        assert_changes_are_fresh(gpu, rasterizer);
     }
 }
 
@@ -127,7 +127,7 @@ fn changed_labels_are_fresh_ones() {
         let (volume, mut scene) = head();
         scene.splatting.rasterizer = rasterizer;
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
-        assert_fresh(&gpu, &mut view, "without tables");
+        assert_fresh(gpu, &mut view, "without tables");
         let mut random = Random(seed);
         let (mut entered, mut left) = (0, 0);
         for step in 0..30 {
@@ -168,7 +168,7 @@ fn changed_labels_are_fresh_ones() {
             left += touched.left;
             // Only some changes are drawn.
             if random.uniform(0.0, 1.0) < 0.75 {
-                assert_fresh(&gpu, &mut view, &name);
+                assert_fresh(gpu, &mut view, &name);
             }
         }
         assert!(entered > 1000 && left > 1000, "{entered} entered, {left} left");
@@ -190,15 +190,15 @@ fn a_change_of_a_label_touches_its_voxels() {
     assert_eq!(view.set_label_visible(4, true), Touched::default());
     assert!(!prepare(&mut view), "nothing changed");
     assert_eq!(view.set_label_visible(4, false), Touched { left: of_label(4), ..Touched::default() });
-    assert_fresh(&gpu, &mut view, "grey matter hidden");
+    assert_fresh(gpu, &mut view, "grey matter hidden");
     let touched = view.set_label_visible(4, true);
     assert_eq!((touched.entered, touched.left), (of_label(4), 0));
-    assert_fresh(&gpu, &mut view, "grey matter shown");
+    assert_fresh(gpu, &mut view, "grey matter shown");
     // Hidden by its opacity instead.
     let mut transfer = view.volume().transfer().clone();
     transfer.labels.entry(7).or_default().opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
     assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched { left: of_label(7), ..Touched::default() });
-    assert_fresh(&gpu, &mut view, "eyes without opacity");
+    assert_fresh(gpu, &mut view, "eyes without opacity");
     // Colours and opacities of a visible label: its voxels are only shaded again.
     for green in [0.2, 0.7] {
         let mut transfer = view.volume().transfer().clone();
@@ -207,13 +207,13 @@ fn a_change_of_a_label_touches_its_voxels() {
         tables.opacity = Some(Ramp::new(vec![(60.0, 0.0), (140.0, green)]).unwrap());
         assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched::default());
         assert!(!prepare(&mut view), "colour and opacity of a label");
-        assert_fresh(&gpu, &mut view, "colour and opacity of a label");
+        assert_fresh(gpu, &mut view, "colour and opacity of a label");
     }
     // A volume that is not segmented has no labels to hide.
     let cube = Arc::new(builtin::volume("cube:16").unwrap());
     let mut view = gpu.view(cube, &scene).unwrap();
     assert_eq!(view.set_label_visible(0, false), Touched::default());
-    assert_fresh(&gpu, &mut view, "no labels");
+    assert_fresh(gpu, &mut view, "no labels");
 }
 
 /// Axis-aligned slices are the same for many directions (§3.1): every axis is sorted once, and a new view along it sorts nothing.
@@ -228,7 +228,7 @@ fn a_turn_sorts_no_slices() {
         let camera = camera(direction, 170.0);
         view.set_camera(Camera { projection: projection.unwrap_or(camera.projection), ..camera }).unwrap();
         let bucketed = gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap().bucketed;
-        assert_fresh(&gpu, &mut view, &format!("{direction:?}"));
+        assert_fresh(gpu, &mut view, &format!("{direction:?}"));
         bucketed
     };
     assert!(look([0.5, 0.8, -0.2], None), "along y for the first time");
@@ -279,7 +279,7 @@ fn parameters_change_at_run_time() {
             view.set_splatting(splatting).unwrap();
             let name = format!("{rasterizer:?}, {footprint:?}, {projection:?}: {name}");
             assert_eq!(prepare(&mut view), Prepared { bucketed, tabled }, "{name}");
-            assert_fresh(&gpu, &mut view, &name);
+            assert_fresh(gpu, &mut view, &name);
         }
     }
 }
@@ -302,7 +302,7 @@ fn every_compositing_is_a_fresh_one() {
                 let name = format!("{rasterizer:?}: {old:?}, then {compositing:?}");
                 let prepared = gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap();
                 assert_eq!(prepared.bucketed, looks_at_all(old) != looks_at_all(compositing), "{name}");
-                assert_fresh(&gpu, &mut view, &name);
+                assert_fresh(gpu, &mut view, &name);
             }
         }
     }
@@ -314,7 +314,7 @@ fn a_change_recomputes_only_what_depends_on_it() {
     let gpu = gpu();
     // What tiles do not support is drawn by quads, temporarily or always.
     for rasterizer in [Rasterizer::Auto, Rasterizer::Quads] {
-        assert_costs(&gpu, rasterizer);
+        assert_costs(gpu, rasterizer);
     }
 }
 
@@ -389,7 +389,7 @@ fn after_splatting_a_changed_view_is_a_fresh_one() {
         let mut view = gpu.view(volume, &scene).unwrap();
         let prepare = |view: &mut SceneView| gpu.renderer().prepare(gpu.device(), gpu.queue(), view).unwrap().bucketed;
         assert!(prepare(&mut view), "{rasterizer:?}: the first frame");
-        assert_fresh(&gpu, &mut view, "first");
+        assert_fresh(gpu, &mut view, "first");
         let (mut changed, mut same) = (0, 0);
         for (name, points) in [
             ("other opacities of the same values", vec![(60.0, 0.0), (90.0, 0.2), (255.0, 0.9)]),
@@ -407,14 +407,14 @@ fn after_splatting_a_changed_view_is_a_fresh_one() {
             let has_changed = touched.entered + touched.left > 0;
             assert_eq!(prepare(&mut view), has_changed, "{name}: {touched:?}");
             (changed, same) = (changed + u32::from(has_changed), same + u32::from(!has_changed));
-            assert_fresh(&gpu, &mut view, &name);
+            assert_fresh(gpu, &mut view, &name);
         }
         assert!(changed >= 4 && same >= 2, "{changed} {same}");
         let color = Ramp::new(vec![(0.0, DVec3::new(1.0, 0.2, 0.1))]).unwrap();
         let transfer = TransferFunction { color, ..view.volume().transfer().clone() };
         assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched::default());
         assert!(!prepare(&mut view), "{rasterizer:?}: a colour");
-        assert_fresh(&gpu, &mut view, "a colour");
+        assert_fresh(gpu, &mut view, "a colour");
     }
 }
 
@@ -427,11 +427,11 @@ fn from_nothing() {
         scene.splatting.rasterizer = rasterizer;
         scene.transfer.iso_ranges = Some(vec![[1e6, 2e6]]);
         let mut view = gpu.view(volume, &scene).unwrap();
-        assert_fresh(&gpu, &mut view, "nothing");
+        assert_fresh(gpu, &mut view, "nothing");
         assert!(view.set_iso_ranges(None).unwrap().entered > 1000);
-        assert_fresh(&gpu, &mut view, "everything");
+        assert_fresh(gpu, &mut view, "everything");
         view.set_iso_ranges(Some(vec![[1e6, 2e6]])).unwrap();
-        assert_fresh(&gpu, &mut view, "nothing again");
+        assert_fresh(gpu, &mut view, "nothing again");
     }
 }
 

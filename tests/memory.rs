@@ -15,7 +15,7 @@ use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::PollType;
 use sheetsplat::{GpuVolume, SceneView};
 
-use common::{FORMS, RASTERIZERS, gpu, gpu_with_small_bindings, lavapipe, scene, transfer};
+use common::{FORMS, RASTERIZERS, gpu, gpu_with_small_bindings, lavapipe, new_gpu, scene, transfer};
 
 fn head(size: u32) -> (Volume, Scene) {
     let mut scene = scene(60, 50);
@@ -42,9 +42,9 @@ fn memory_is_freed() {
         let mut view = gpu.view(volume, &scene).unwrap();
         view.set_first_hit((number % 3 == 0).then_some(0.1)).unwrap();
         gpu.draw(&mut view).unwrap();
-        assert!(allocated(&gpu) >= view.gpu_bytes(), "it is really there");
+        assert!(allocated(gpu) >= view.gpu_bytes(), "it is really there");
         drop(view);
-        held.push(allocated(&gpu));
+        held.push(allocated(gpu));
     }
     // Pipelines stay, and a few hundred bytes of wgpu's own vary; any buffer of a frame's image is larger.
     let most = held[..10].iter().max().unwrap() + 1024;
@@ -59,7 +59,7 @@ fn a_view_that_shrinks_frees_memory() {
     for rasterizer in RASTERIZERS {
         let (volume, mut scene) = head(16);
         scene.splatting.rasterizer = rasterizer;
-        let before = allocated(&gpu);
+        let before = allocated(gpu);
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
         for number in 0..40 {
             (scene.image.width, scene.image.height) = if number % 2 == 0 { (400, 300) } else { (60, 50) };
@@ -70,7 +70,7 @@ fn a_view_that_shrinks_frees_memory() {
             assert!((fresh.gpu_bytes()..=4 * fresh.gpu_bytes()).contains(&view.gpu_bytes()), "{rasterizer:?} {number}");
         }
         drop(view);
-        let after = allocated(&gpu);
+        let after = allocated(gpu);
         assert!(after <= before + (1 << 16), "{rasterizer:?}: {before} {after}");
     }
 }
@@ -108,7 +108,7 @@ fn a_volumes_bytes_are_known_before() {
 /// The estimate is exact before anything of a frame is allocated, for each rasterizer, several brick lists and bands of rows.
 #[test]
 fn a_frames_bytes_are_known_before() {
-    let [roomy, small] = [gpu(), gpu_with_small_bindings(64 << 10)];
+    let [roomy, small] = [new_gpu(), gpu_with_small_bindings(64 << 10)];
     let profiling = GpuHeadless::new(&lavapipe().with_profile(true)).unwrap();
     let (volume, base) = head(40);
     let mut scenes = Vec::new();
@@ -197,14 +197,14 @@ fn first_hits_stay_where_they_are() {
         view.set_first_hit(Some(0.1)).unwrap();
         gpu.draw(&mut view).unwrap();
         let texture = view.first_hits().unwrap().clone();
-        let (bytes, held) = (view.gpu_bytes(), allocated(&gpu));
+        let (bytes, held) = (view.gpu_bytes(), allocated(gpu));
         for _ in 0..5 {
             view.set_light(Light::Direction(DVec3::X)).unwrap();
             gpu.draw(&mut view).unwrap();
             assert!(*view.first_hits().unwrap() == texture, "{rasterizer:?}");
         }
         assert_eq!(view.gpu_bytes(), bytes);
-        assert!(allocated(&gpu) <= held + 1024, "{rasterizer:?}");
+        assert!(allocated(gpu) <= held + 1024, "{rasterizer:?}");
         scene.image.width += 1;
         view.set_image(scene.image).unwrap();
         gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut view).unwrap();

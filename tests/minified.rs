@@ -48,9 +48,9 @@ fn decibels(a: &Image, b: &Image) -> f64 {
 /// The PSNR in dB, by whatever draws, between a view at a quarter of its size and the box-filtered one; also the latter.
 fn by_all(volume: &Volume, scene: &Scene) -> ([f64; 3], Image) {
     let gpu = gpu();
-    let filtered = box_filtered(&Drawing::Native.render(&gpu, volume, scene).image);
+    let filtered = box_filtered(&Drawing::Native.render(gpu, volume, scene).image);
     let small = minified(scene);
-    (DRAWINGS.map(|drawing| decibels(&drawing.render(&gpu, volume, &small).image, &filtered)), filtered)
+    (DRAWINGS.map(|drawing| decibels(&drawing.render(gpu, volume, &small).image, &filtered)), filtered)
 }
 
 /// The f64 image of an orthographic view without the low-pass rule, with footprints of any size.

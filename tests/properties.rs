@@ -60,7 +60,7 @@ fn empty_volume_is_exactly_the_background() {
                 let [r, g, b, a] = background;
                 let expected = [r * a, g * a, b * a, a].map(|channel| channel as f32);
                 for drawing in DRAWINGS {
-                    let (image, _) = render(drawing, &gpu, &volume, &scene);
+                    let (image, _) = render(drawing, gpu, &volume, &scene);
                     assert!(
                         image.pixels.iter().all(|pixel| *pixel == expected),
                         "{drawing:?} {compositing:?} {order:?} {background:?} {center}"
@@ -177,9 +177,9 @@ fn uniform_slab_opacity_is_that_of_its_thickness() {
                         break direction;
                     }
                 };
-                slab.check(&gpu, drawing, direction, slab_width);
+                slab.check(gpu, drawing, direction, slab_width);
             }
-            slab.check(&gpu, drawing, DVec3::AXES[axis], 1.0);
+            slab.check(gpu, drawing, DVec3::AXES[axis], 1.0);
         }
     }
 }
@@ -197,11 +197,11 @@ fn exponential_alpha_does_not_depend_on_the_slab_width() {
         // With thinner sheets pixels become opaque at other sheets.
         scene.splatting.culling = false;
         scene.image.background = [0.0; 4];
-        let reference = alpha(&render(drawing, &gpu, &volume, &scene).0);
+        let reference = alpha(&render(drawing, gpu, &volume, &scene).0);
         assert!(reference.iter().any(|alpha| (0.3..0.9).contains(alpha)) && reference.contains(&0.0));
         for slab_width in [0.25, 0.37, 0.5, 2.0, 3.1, 4.0] {
             scene.splatting.slab_width = slab_width;
-            let (image, sheets) = render(drawing, &gpu, &volume, &scene);
+            let (image, sheets) = render(drawing, gpu, &volume, &scene);
             // Planes and depths are f32, below 32 here, so the far plane of a slab and the near plane of the next one leave a gap, or
             // overlap, by up to a step of 2⁻¹⁹. There is one plane per slab width, each attenuated by what lies before it, and two
             // roundings per sheet.
@@ -233,9 +233,9 @@ fn back_to_front_equals_front_to_back() {
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
         scene.splatting.footprint = form;
         scene.splatting.order = Order::FrontToBack;
-        let (front_to_back, sheets) = render(drawing, &gpu, &volume, &scene);
+        let (front_to_back, sheets) = render(drawing, gpu, &volume, &scene);
         scene.splatting.order = Order::BackToFront;
-        let (back_to_front, _) = render(drawing, &gpu, &volume, &scene);
+        let (back_to_front, _) = render(drawing, gpu, &volume, &scene);
         let difference = largest_difference(&front_to_back, &back_to_front);
         // Each sheet adds a subtraction, a product and a sum of numbers up to 1, in either order, whose roundings have either sign. The native
         // backend's sheets sum up voxels in either order, too.
@@ -261,10 +261,10 @@ fn every_run_gives_the_same_bytes() {
             let (image, _) = render(drawing, gpu, &volume, &scene);
             bytemuck::cast_slice::<_, u8>(image.pixels.as_flattened()).to_vec()
         };
-        let image = bytes(&first);
+        let image = bytes(first);
         assert_eq!(image.len(), 96 * 80 * 16);
-        assert!(image == bytes(&first), "{compositing:?} {drawing:?} {form:?} {projection:?}, on the same device");
-        assert!(image == bytes(&second), "{compositing:?} {drawing:?} {form:?} {projection:?}, on a new device");
+        assert!(image == bytes(first), "{compositing:?} {drawing:?} {form:?} {projection:?}, on the same device");
+        assert!(image == bytes(second), "{compositing:?} {drawing:?} {form:?} {projection:?}, on a new device");
     }
 }
 
@@ -308,7 +308,7 @@ fn constant_colour_is_constant_colour_times_alpha() {
         let rounding = if drawing.rounds_to_f16() { 2.0 * F16 } else { 0.0 };
         for slab_width in [0.5, 1.0, 3.0] {
             scene.splatting.slab_width = slab_width;
-            let (image, sheets) = render(drawing, &gpu, &volume, &scene);
+            let (image, sheets) = render(drawing, gpu, &volume, &scene);
             assert!(image.pixels.iter().any(|pixel| pixel[3] > 0.99));
             for (i, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);

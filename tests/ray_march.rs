@@ -53,7 +53,7 @@ fn assert_close(name: &str, volume: Volume, mut scene: Scene, stride: u32, requi
     let drawn = DRAWINGS.map(|drawing| {
         [false, true].map(|culling| {
             scene.splatting.culling = culling;
-            marched.psnr(&drawing.render(&gpu, &volume, &scene).image)
+            marched.psnr(&drawing.render(gpu, &volume, &scene).image)
         })
     });
     println!("{name}: twin {by_twin:.1} dB; by {DRAWINGS:?}, without and with culling: {drawn:.1?} dB");

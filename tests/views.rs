@@ -63,7 +63,7 @@ fn any_view_equals_the_reference() {
         seen += usize::from(expected.pixels.iter().filter(|pixel| **pixel != BLACK).count() > 100);
         for (at, rasterizer) in RASTERIZERS.into_iter().enumerate() {
             let [forwards, backwards] =
-                [Order::FrontToBack, Order::BackToFront].map(|order| render(&gpu, &volume, &scene, rasterizer, order));
+                [Order::FrontToBack, Order::BackToFront].map(|order| render(gpu, &volume, &scene, rasterizer, order));
             for rendering in [&forwards, &backwards] {
                 assert_eq!(all(&rendering.stats.counts), all(&counts), "case {case}, {rasterizer:?}: {scene:?}");
             }
@@ -79,4 +79,26 @@ fn any_view_equals_the_reference() {
     }
     println!("image-aligned in perspective and axis-aligned, at least: {worst:.1?} dB by {RASTERIZERS:?}");
     assert!(seen > 15, "only {seen} views show much");
+}
+
+/// Threads that draw and pick with one device get what each of them would get alone, whichever of them waits for the GPU.
+#[test]
+fn threads_share_a_device() {
+    let gpu = gpu();
+    let mut random = Random(7);
+    let cases: Vec<_> = std::iter::repeat_with(|| random_case(&mut random)).take(4).collect();
+    let draw = |(volume, scene): &(Volume, Scene)| {
+        let mut view = gpu.view(volume.clone(), scene).unwrap();
+        view.set_first_hit(Some(0.1)).unwrap();
+        let Rendering { image, stats } = gpu.draw(&mut view).unwrap();
+        let [x, y] = [image.width / 2, image.height / 2];
+        (image, stats.counts, gpu.pick(&view, [x, y]).unwrap().map(|pick| pick.voxel))
+    };
+    let alone: Vec<_> = cases.iter().map(draw).collect();
+    assert!(alone.iter().any(|(_, _, voxel)| voxel.is_some()));
+    std::thread::scope(|threads| {
+        for (case, expected) in cases.iter().zip(&alone) {
+            threads.spawn(move || (0..8).for_each(|_| assert!(draw(case) == *expected)));
+        }
+    });
 }

@@ -98,7 +98,7 @@ fn images_are_the_twins() {
                     let volume = if compositing == Compositing::Minimum { &textured } else { &volume };
                     let case = format!("{spacing:?} {compositing:?} {interpolation:?} {projection:?}");
                     let required = if gradient == Gradient::Kernel { 55.0 } else { 60.0 };
-                    assert_twins(&gpu, (volume, &scene), required, &case);
+                    assert_twins(gpu, (volume, &scene), required, &case);
                 }
             }
         }
@@ -149,7 +149,7 @@ fn settings_are_the_twins() {
                 change(&mut scene);
                 scene.camera.projection = projection.unwrap_or(scene.camera.projection);
                 let case = format!("{name} {compositing:?} {projection:?}");
-                assert_twins(&gpu, (&volume, &scene), 60.0, &case);
+                assert_twins(gpu, (&volume, &scene), 60.0, &case);
             }
         }
     }
@@ -176,10 +176,10 @@ fn culling_keeps_its_promise() {
             for rasterizer in RASTERIZERS {
                 scene.splatting.culling = false;
                 let drawing = Drawing::By(rasterizer);
-                let whole = drawing.render(&gpu, &volume, &scene);
+                let whole = drawing.render(gpu, &volume, &scene);
                 assert_shows(&whole.image, &scene);
                 scene.splatting.culling = true;
-                let culled = drawing.render(&gpu, &volume, &scene);
+                let culled = drawing.render(gpu, &volume, &scene);
                 let farthest = largest_difference(&whole.image, &culled.image);
                 let is_gradual = matches!(compositing, Compositing::Linear | Compositing::Exponential);
                 let allowed = if is_gradual { 1.0 - THRESHOLD + 1e-5 } else { 1e-5 };
@@ -204,7 +204,7 @@ fn holes_and_labels_are_the_twins() {
         for projection in [None, Some(eye(50.0))] {
             let mut scene = for_all(head([1.0, 1.0, 1.5]).1, compositing);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-            holes_and_labels(&gpu, scene);
+            holes_and_labels(gpu, scene);
         }
     }
 }
@@ -281,7 +281,7 @@ fn surfaces_and_first_hits_are_the_twins() {
                 let mut drawn = gpu.view(volume.clone(), &scene).unwrap();
                 let unit = volume.grid().unit();
                 let planes = [if projection.is_some() { 1.0 } else { 0.01 }, 1000.0];
-                let given = surfaces(&gpu, &view, unit, DepthRange::Standard, planes, &depths, [case, 3]);
+                let given = surfaces(gpu, &view, unit, DepthRange::Standard, planes, &depths, [case, 3]);
                 drawn.set_surfaces(Some(given)).unwrap();
                 drawn.set_first_hit(first_hit).unwrap();
                 let image = gpu.draw(&mut drawn).unwrap().image;
@@ -338,7 +338,7 @@ fn counts_are_the_twins() {
             };
             for rasterizer in RASTERIZERS {
                 let what = format!("{compositing:?} {projection:?} {rasterizer:?}");
-                let ours = Drawing::By(rasterizer).render(&gpu, &volume, &scene).stats.counts;
+                let ours = Drawing::By(rasterizer).render(gpu, &volume, &scene).stats.counts;
                 println!("{what}: {:?}", of(&ours));
                 assert_eq!(of(&ours), of(&expected), "{what}");
                 assert!(ours.voxels_in_range > 0);
@@ -372,6 +372,6 @@ fn surfaces_of_a_single_value_are_the_twins() {
     scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
     for value in [60.0, 100.3] {
         scene.transfer.iso_ranges = Some(vec![[value, value]]);
-        assert_twins(&gpu, (&volume, &scene), 60.0, &format!("{value}"));
+        assert_twins(gpu, (&volume, &scene), 60.0, &format!("{value}"));
     }
 }

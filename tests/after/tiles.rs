@@ -69,7 +69,7 @@ fn compare(seed: u64, has_eye: bool, least: f64, change: impl Fn(&mut Random, &m
             let (mut volume, mut scene) = random_case(&mut random, has_eye);
             scene.splatting.compositing = compositing;
             change(&mut random, &mut volume, &mut scene);
-            let [found, expected] = frames(&gpu, &volume, &scene);
+            let [found, expected] = frames(gpu, &volume, &scene);
             seen += shown(&expected);
             let psnr = decibels(rms(&found, &expected));
             println!("{compositing:?} case {case}: {psnr:.1} dB");
@@ -128,7 +128,7 @@ fn frames_of_many_dispatches_agree_with_the_f64_evaluation() {
         // Pixels as large as two voxels.
         scene.camera.projection = Projection::Orthographic { height: Some(2.0 * half) };
         scene.splatting.compositing = Compositing::Xray;
-        let [found, expected] = frames(&gpu, &volume, &scene);
+        let [found, expected] = frames(gpu, &volume, &scene);
         assert!(shown(&expected) > 100, "{}", shown(&expected));
         assert_at_least(decibels(rms(&found, &expected)), 80.0, format!("{slab_width} {direction}"));
     }

@@ -21,7 +21,7 @@ fn the_border_of_two_labels_has_no_third_colour() {
     scene.camera = camera([0.0, 1.0, 0.0], 20.0);
     scene.shading.enabled = false;
     for drawing in BY_CHOICE {
-        assert_mixtures_of_two(drawing, &drawing.render(&gpu, &volume, &scene).image);
+        assert_mixtures_of_two(drawing, &drawing.render(gpu, &volume, &scene).image);
     }
 }
 
@@ -56,7 +56,7 @@ fn an_xray_along_an_axis_reaches_white_and_no_more() {
         scene.camera.up = if direction[2] == 0.0 { DVec3::Z } else { DVec3::Y };
         let volume = scene.load_volume().unwrap();
         for drawing in BY_CHOICE {
-            let image = drawing.render(&gpu, &volume, &scene).image;
+            let image = drawing.render(gpu, &volume, &scene).image;
             let brightest = image.pixels.iter().map(|pixel| pixel[0]).fold(0.0, f32::max);
             let saturated = image.pixels.iter().filter(|pixel| pixel[0] >= 1.0).count();
             let what = format!("{name}, {drawing:?}");
@@ -83,7 +83,7 @@ fn a_mip_shows_the_brightest_value() {
     let mut scene = builtin_scene("cube:8", &["preset=mip", "image.width=40", "image.height=40"]);
     scene.camera = camera([0.0, 1.0, 0.0], 20.0);
     for drawing in BY_CHOICE {
-        let image = drawing.render(&gpu, &volume, &scene).image;
+        let image = drawing.render(gpu, &volume, &scene).image;
         let [ball, wall] = [20 * 40 + 20, 6 * 40 + 6].map(|at: usize| f64::from(image.pixels[at][0]));
         assert!(ball > 0.9 && (0.3..0.5).contains(&wall), "{drawing:?}: {ball} {wall}");
     }
@@ -106,7 +106,7 @@ fn every_preset_shows_something_of_every_builtin() {
             };
             let volume = scene.load_volume().unwrap();
             for drawing in BY_CHOICE {
-                let image = drawing.render(&gpu, &volume, &scene).image;
+                let image = drawing.render(gpu, &volume, &scene).image;
                 let lit = image.pixels.iter().filter(|pixel| pixel[..3].iter().any(|&c| c > 0.1)).count();
                 assert!(lit > least, "{preset} of {name}, {drawing:?}: {lit} pixels");
             }

@@ -103,7 +103,7 @@ fn the_gpu_draws_what_the_twin_draws() {
             }
             let (volume, mut scene) = colored(&mut random, DVec3::new(1.0, 1.2, 0.9));
             scene.splatting = Splatting { classification, compositing, interpolation, ..scene.splatting };
-            assert_is_the_twins(&gpu, &volume, &scene);
+            assert_is_the_twins(gpu, &volume, &scene);
         }
     }
     let (volume, mut scene) = colored(&mut random, DVec3::ONE);
@@ -137,7 +137,7 @@ fn the_gpu_draws_colours_of_any_channel() {
         if round % 3 == 2 && classification == Classification::After {
             scene.splatting.interpolation = Interpolation::Exact;
         }
-        assert_is_the_twins(&gpu, &volume, &scene);
+        assert_is_the_twins(gpu, &volume, &scene);
     }
 }
 

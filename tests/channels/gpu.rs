@@ -83,7 +83,7 @@ fn whole_frames_are_those_of_the_twin() {
         if round % 4 == 1 && compositing != Compositing::Surface {
             scene.splatting.order = Order::BackToFront;
         }
-        assert_is_the_twins(&gpu, &volume, &scene, &format!("{count} channels"));
+        assert_is_the_twins(gpu, &volume, &scene, &format!("{count} channels"));
     }
 }
 
@@ -119,7 +119,7 @@ fn channels_of_different_bricks_are_each_drawn_whole() {
             .collect();
         set_transfers(&mut scene, &transfers);
         scene.splatting.culling = false;
-        assert_is_the_twins(&gpu, &volume, &scene, &format!("{count} channels"));
+        assert_is_the_twins(gpu, &volume, &scene, &format!("{count} channels"));
         let [quads, tiles] = [Rasterizer::Quads, Rasterizer::Tiles]
             .map(|rasterizer| gpu.render_volume(volume.clone(), &by(rasterizer, &scene)).unwrap().stats.counts);
         assert_eq!(tiles.voxels_shaded, quads.voxels_shaded, "{count} channels");
@@ -134,7 +134,7 @@ fn exact_fields_are_those_of_the_twin() {
         let (volume, mut scene) = random_case(&mut random, 3);
         scene.splatting.classification = Classification::After;
         (scene.splatting.compositing, scene.splatting.interpolation) = (compositing, Interpolation::Exact);
-        assert_is_the_twins(&gpu, &volume, &scene, "exact");
+        assert_is_the_twins(gpu, &volume, &scene, "exact");
     }
 }
 
@@ -175,7 +175,7 @@ fn labels_of_every_channel_have_their_tables() {
             draw(Backend::Cpu, &volume, &plain).image
         };
         assert_ne!(draw(Backend::Cpu, &volume, &scene).image, without, "the tables of the last channel show");
-        assert_is_the_twins(&gpu, &volume, &scene, "labels");
+        assert_is_the_twins(gpu, &volume, &scene, "labels");
     }
 }
 
@@ -439,9 +439,8 @@ fn four_channels_keep_within_webgpus_default_limits() {
         for (classification, compositing) in modes() {
             (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
             scene.splatting.rasterizer = Rasterizer::Quads;
-            let images: Vec<Image> = [&full, &with_f32, &with_f16]
-                .map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap().image)
-                .into();
+            let images: Vec<Image> =
+                [full, &with_f32, &with_f16].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap().image).into();
             let what = format!("{count} channels, {classification:?} {compositing:?}");
             let [f32_sheets, f16_sheets] = [1, 2].map(|at| decibels(rms(&images[0], &images[at])));
             // The boundaries of groups and lists may differ, which moves roundings.

@@ -6,6 +6,8 @@ pub(crate) mod shared;
 pub(crate) mod store;
 pub(crate) mod surfaces;
 
+use std::sync::LazyLock;
+
 use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::DeviceRequirements;
 use sheetsplat::cpu;
@@ -88,8 +90,15 @@ pub(crate) fn lavapipe() -> HeadlessOptions {
     HeadlessOptions::default().with_adapter("llvmpipe")
 }
 
-/// A device as the program opens it, with f32 sheets. The test fails without a GPU or software driver.
-pub(crate) fn gpu() -> GpuHeadless {
+/// A device as the program opens it, with f32 sheets. All tests of a process share it, because compiling its pipelines takes longer than most tests do. The
+/// test fails without a GPU or software driver.
+pub(crate) fn gpu() -> &'static GpuHeadless {
+    static SHARED: LazyLock<GpuHeadless> = LazyLock::new(new_gpu);
+    &SHARED
+}
+
+/// Such a device for one test alone.
+pub(crate) fn new_gpu() -> GpuHeadless {
     let options = lavapipe().with_sheet_format(TextureFormat::Rgba32Float);
     GpuHeadless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
 }

@@ -54,7 +54,7 @@ fn the_average_of_a_constant_is_the_constant() {
         scene.splatting.compositing = Compositing::Average;
         let (center, radius, view) = (volume.grid().center(), scene.splatting.radius, view_of(&volume, &scene));
         for drawing in DRAWINGS {
-            let image = render(drawing, &gpu, &volume, &scene).0;
+            let image = render(drawing, gpu, &volume, &scene).0;
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);
                 brightest = brightest.max(largest([alpha / OPACITY]));
@@ -94,7 +94,7 @@ fn the_minimum_of_a_constant_is_the_constant_inside() {
         let [within, around] = [complete - 0.1, complete + 0.1];
         for (drawing, order) in DRAWINGS.into_iter().zip([Order::FrontToBack, Order::BackToFront, Order::FrontToBack]) {
             scene.splatting.order = order;
-            let image = render(drawing, &gpu, &volume, &scene).0;
+            let image = render(drawing, gpu, &volume, &scene).0;
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let alpha = f64::from(pixel[3]);
                 if in_box(&view, volume.grid().aspect(), at, within).is_some() {
@@ -129,13 +129,13 @@ fn the_minimum_across_a_gap_is_empty() {
         {
             scene.splatting.order = order;
             scene.clip = Clip::default();
-            let image = render(drawing, &gpu, &volume, &scene).0;
+            let image = render(drawing, gpu, &volume, &scene).0;
             assert!(image.pixels.iter().all(|pixel| *pixel == [0.0; 4]), "{empty:?} {drawing:?} {order:?}");
             // A part that is cut away is not a gap.
             let side = |y: u32, sign: f64| [0.0, sign, 0.0, -sign * (f64::from(y) - 29.5 + sign)];
             let kept = if empty.end < 55 { side(empty.end + 1, 1.0) } else { side(empty.start - 2, -1.0) };
             scene.clip.planes = vec![kept];
-            let image = render(drawing, &gpu, &volume, &scene).0;
+            let image = render(drawing, gpu, &volume, &scene).0;
             let alpha = image.pixels[54 * 120 + 60][3];
             assert!(alpha > 0.25, "{empty:?} {drawing:?} {order:?}: {alpha}");
         }
@@ -160,7 +160,7 @@ fn the_minimum_across_empty_groups_is_empty() {
             .flat_map(|drawing| [Order::FrontToBack, Order::BackToFront].map(|order| (drawing, order)))
         {
             scene.splatting.order = order;
-            let image = render(drawing, &gpu, &volume, &scene).0;
+            let image = render(drawing, gpu, &volume, &scene).0;
             if parts[1].len() == 100 {
                 let alpha = image.pixels[54 * 120 + 60][3];
                 assert!(alpha > 0.25, "{drawing:?} {order:?}: {alpha}");
@@ -191,7 +191,7 @@ fn maximum_and_average_are_the_same_from_behind() {
             scene.transfer = transfer(&[(0.0, [1.0, 0.7, 0.4])], &[(0.0, 0.0), (255.0, 1.0)]);
             let [front, behind] = [direction, -direction].map(|direction| {
                 scene.camera.direction = direction;
-                render(drawing, &gpu, &volume, &scene).0
+                render(drawing, gpu, &volume, &scene).0
             });
             let mirrored = behind.pixels.chunks(70).flat_map(|row| row.iter().rev().copied()).collect();
             let difference = largest_difference(&front, &Image { pixels: mirrored, ..behind });

@@ -28,7 +28,7 @@ fn surfaces_cull_and_the_others_do_not() {
             scene.splatting.footprint = footprint;
             let [with, without] = [true, false].map(|culling| {
                 scene.splatting.culling = culling;
-                render(drawing, &gpu, &volume, &scene)
+                render(drawing, gpu, &volume, &scene)
             });
             let share = share_off(&with.0.pixels, &without.0.pixels, 1e-4);
             assert_at_most(share, OUTLIERS, format_args!("{compositing:?}, {drawing:?}, {footprint:?}: pixels"));

@@ -34,7 +34,7 @@ fn the_surface_of_a_step() {
             scene.splatting.slab_width = width;
             let pixels = [[60, 54], [6, 100], [110, 4]];
             let HostFrame { image, picks, .. } =
-                draw_for_host(drawing, &gpu, (&volume, &scene), (Some(0.7), None), &pixels);
+                draw_for_host(drawing, gpu, (&volume, &scene), (Some(0.7), None), &pixels);
             for (at, pixel) in image.pixels.iter().enumerate() {
                 let color = COLOR.map(|channel| channel as f32);
                 let is_inside = pixel.iter().zip(color).all(|(a, b)| (a - b).abs() < 1e-3);
@@ -48,11 +48,11 @@ fn the_surface_of_a_step() {
             // At a lower opacity the surface lies farther inside.
             let (volume, mut scene) = step(0.6);
             scene.splatting.slab_width = width;
-            let image = render(drawing, &gpu, &volume, &scene).0;
+            let image = render(drawing, gpu, &volume, &scene).0;
             assert!(image.pixels.iter().all(|pixel| pixel[3] == 1.0));
             let (volume, mut scene) = step(0.45);
             scene.splatting.slab_width = width;
-            let image = render(drawing, &gpu, &volume, &scene).0;
+            let image = render(drawing, gpu, &volume, &scene).0;
             assert!(image.pixels.iter().all(|pixel| *pixel == [0.0; 4]));
         }
     }
@@ -79,7 +79,7 @@ fn haze_before_a_gap_does_not_colour_a_surface() {
     let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
     for (drawing, tiles) in DRAWINGS.into_iter().flat_map(|drawing| [true, false].map(|tiles| (drawing, tiles))) {
         scene.splatting.tiles = tiles;
-        for pixels in [&expected, &render(drawing, &gpu, &volume, &scene).0].map(|image| &image.pixels) {
+        for pixels in [&expected, &render(drawing, gpu, &volume, &scene).0].map(|image| &image.pixels) {
             let is_blue = |pixel: &[f32; 4]| pixel[3] == 1.0 && pixel[0] < 1e-6 && (pixel[2] - 1.0).abs() < 2e-3;
             assert!(pixels.iter().all(is_blue), "{drawing:?}, {tiles}: {:?}", pixels[6540]);
         }
@@ -105,7 +105,7 @@ fn a_surface_has_no_rings() {
         for drawing in DRAWINGS {
             let [wide, thin] = [1.0, 0.05].map(|width| {
                 scene.splatting.slab_width = width;
-                render(drawing, &gpu, &volume, &scene).0.pixels
+                render(drawing, gpu, &volume, &scene).0.pixels
             });
             let opaque = wide.iter().zip(&thin).filter(|(a, b)| a[3] == 1.0 && b[3] == 1.0);
             let errors: Vec<f64> =

@@ -51,7 +51,7 @@ fn any_view_equals_the_reference() {
             shown += usize::from(background.count() + 100 < expected.image.pixels.len());
             for (drawing, off) in DRAWINGS.into_iter().zip(&mut off) {
                 let host = (first_hit, depths.as_deref());
-                let HostFrame { image, hits, .. } = draw_for_host(drawing, &gpu, (&volume, &scene), host, &[]);
+                let HostFrame { image, hits, .. } = draw_for_host(drawing, gpu, (&volume, &scene), host, &[]);
                 // Quads round amounts to f16.
                 let share = share_off(&image.pixels, &expected.image.pixels, 2e-3);
                 *off += share / CASES as f64;
@@ -98,7 +98,7 @@ fn thin_volumes() {
             (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
             let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
             for drawing in DRAWINGS {
-                let image = render(drawing, &gpu, &volume, &scene).0;
+                let image = render(drawing, gpu, &volume, &scene).0;
                 let what = format!("{dims:?} {direction} {compositing:?} {method:?} {drawing:?}");
                 let share = share_off(&image.pixels, &expected.pixels, 2e-3);
                 assert_at_most(share, 2.0 * OUTLIERS, &what);

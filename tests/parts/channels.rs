@@ -223,7 +223,7 @@ fn parts_of_several_channels_merge() {
         let (_, streamed) = streamed(&volume);
         let mut view = headless.view(streamed.clone(), &scene).unwrap();
         let whole = headless.draw(&mut view).unwrap().image;
-        let parts = in_four(&headless, &mut view);
+        let parts = in_four(headless, &mut view);
         // Every store counts for what a part belongs to.
         let mut fingerprints = vec![parts[0].identity.fingerprint.clone()];
         let another = |volume: &Volume| {
@@ -339,7 +339,7 @@ fn parts_of_images_that_add_up_merge() {
             let headless = headless(backend);
             let mut view = headless.view(streamed(&volume).1, &scene).unwrap();
             let whole = headless.draw(&mut view).unwrap().image;
-            let parts = in_four(&headless, &mut view);
+            let parts = in_four(headless, &mut view);
             assert_eq!(parts[0].further.len(), 1);
             let merged = Image::merge(parts).unwrap();
             assert_at_most(largest_difference(&merged, &whole), 1e-6, format!("{backend} {compositing}"));

@@ -25,7 +25,7 @@ fn parts_of(compositing: Compositing, classification: Classification) -> Vec<Par
     let (volume, mut scene) = head(24, [37, 35]);
     scene.splatting.compositing = compositing;
     scene.splatting.classification = classification;
-    parts(&headless(Backend::Cpu), &volume, &scene, 2)
+    parts(headless(Backend::Cpu), &volume, &scene, 2)
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn parts_of_other_images_are_refused() {
 fn fingerprints_tell_images_apart() {
     let headless = headless(Backend::Cpu);
     let (volume, scene) = head(24, [37, 35]);
-    let fingerprint = |volume, scene: &_| parts(&headless, volume, scene, 2)[0].identity.fingerprint.clone();
+    let fingerprint = |volume, scene: &_| parts(headless, volume, scene, 2)[0].identity.fingerprint.clone();
     let first = fingerprint(&volume, &scene);
     assert_eq!(first, fingerprint(&volume, &scene));
     assert_eq!(first.len(), 64);
@@ -149,7 +149,7 @@ fn fingerprints_tell_images_apart() {
     named.splatting.rasterizer = sheetsplat::settings::Rasterizer::Quads;
     assert_eq!(first, fingerprint(&volume, &named));
     let reference = crate::merging::headless(Backend::Reference);
-    assert_eq!(first, parts(&reference, &volume, &scene, 2)[0].identity.fingerprint);
+    assert_eq!(first, parts(reference, &volume, &scene, 2)[0].identity.fingerprint);
     let mut turned = scene.clone();
     turned.camera.direction.x += 1e-9;
     assert_ne!(first, fingerprint(&volume, &turned));

@@ -61,7 +61,7 @@ fn parts_merge_by_every_backend() {
 fn compare_ranges(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
     let headless = headless(backend);
     let whole = headless.render_volume(Arc::clone(volume), scene).unwrap().image;
-    let all = parts(&headless, volume, scene, 3);
+    let all = parts(headless, volume, scene, 3);
     let counts: Vec<f32> = all.iter().flat_map(|part| &part.content.extremes).map(|mean| mean.counted).collect();
     for counted in [0.0, Extreme::MIDDLE, Extreme::POINT, 4.0] {
         assert!(counts.contains(&counted), "{backend} {counted}");
@@ -102,7 +102,7 @@ fn parts_of_a_streamed_volume_merge() {
 #[test]
 fn tables_belong_to_means() {
     let (volume, scene) = means(24);
-    let part = parts(&headless(Backend::Cpu), &volume, &scene, 2).remove(0);
+    let part = parts(headless(Backend::Cpu), &volume, &scene, 2).remove(0);
     let folder = tempfile::tempdir().unwrap();
     let reopened = |change: &dyn Fn(&mut Part)| {
         let path = folder.path().join("part.npz");

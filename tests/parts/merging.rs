@@ -1,6 +1,6 @@
 //! Parts of a frame against the whole of it.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use glam::{DVec3, UVec3};
 use sheetsplat::cpu::CpuRenderer;
@@ -20,8 +20,20 @@ use crate::common::{COMPOSITINGS, scene};
 /// By how much a merged image may differ from the whole one (SPEC §11).
 const ALLOWED: f64 = 1e-6;
 
-pub(crate) fn headless(backend: Backend) -> Headless {
-    Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap()
+/// What draws by a backend, which all tests of a process share, because compiling a GPU's pipelines takes longer than most of them.
+pub(crate) fn headless(backend: Backend) -> &'static Headless {
+    static GPU: LazyLock<Headless> = LazyLock::new(|| new(Backend::Gpu));
+    static CPU: LazyLock<Headless> = LazyLock::new(|| new(Backend::Cpu));
+    static REFERENCE: LazyLock<Headless> = LazyLock::new(|| new(Backend::Reference));
+    fn new(backend: Backend) -> Headless {
+        Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap()
+    }
+    match backend {
+        Backend::Gpu => &GPU,
+        Backend::Cpu => &CPU,
+        Backend::Reference => &REFERENCE,
+        _ => panic!("{backend:?} is no backend that tests name"),
+    }
 }
 
 /// A head from a slanted direction, where nothing is culled before a pixel is wholly opaque.
@@ -74,7 +86,7 @@ pub(crate) fn compare(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
     let headless = headless(backend);
     let whole = headless.render_volume(Arc::clone(volume), scene).unwrap().image;
     let ranges = if backend == Backend::Gpu { 3 } else { 8 };
-    let mut parts = parts(&headless, volume, scene, ranges);
+    let mut parts = parts(headless, volume, scene, ranges);
     // The order in which parts are given does not matter.
     parts.reverse();
     parts.swap(3, 7);
@@ -176,7 +188,7 @@ fn parts_of_images_that_add_up_merge() {
         for backend in [Backend::Gpu, Backend::Reference] {
             compare(backend, &volume, &scene);
         }
-        let drawn = parts(&headless(Backend::Cpu), &volume, &scene, 2);
+        let drawn = parts(headless(Backend::Cpu), &volume, &scene, 2);
         assert!(drawn.iter().all(|part| (part.identity.images, part.further.len()) == (2, 1)));
         let counts = |content: &Content| {
             let has_points = content.extremes.iter().any(|extreme| extreme.counted >= Extreme::POINT);
@@ -193,7 +205,7 @@ fn parts_of_images_that_add_up_merge() {
         // A channel without opacity changes nothing.
         scene.further[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
         compare(Backend::Cpu, &volume, &scene);
-        let mut short = parts(&headless(Backend::Cpu), &volume, &scene, 2);
+        let mut short = parts(headless(Backend::Cpu), &volume, &scene, 2);
         short[1].further.clear();
         let message = Image::merge(short).unwrap_err().to_string();
         assert!(message.contains("images of channels: found 1, allowed: 2"), "{message}");
@@ -282,7 +294,7 @@ fn parts_of_all_backends_merge() {
         let [gpu, cpu] = [Backend::Gpu, Backend::Cpu].map(headless);
         let mut view = gpu.view(Arc::clone(&volume), &scene).unwrap();
         let before = gpu.draw(&mut view).unwrap().image;
-        let mixed = parts(&gpu, &volume, &scene, 4).into_iter().zip(parts(&cpu, &volume, &scene, 4));
+        let mixed = parts(gpu, &volume, &scene, 4).into_iter().zip(parts(cpu, &volume, &scene, 4));
         let chosen = mixed.enumerate().map(|(at, (gpu, cpu))| if at % 3 == 0 { cpu } else { gpu });
         let merged = Image::merge(chosen).unwrap();
         assert_at_most(largest_difference(&merged, &before), 2e-5, format!("{compositing:?}"));
@@ -308,7 +320,7 @@ fn culled_parts_merge_within_the_threshold() {
     let (volume, mut scene) = head(48, [90, 70]);
     scene.splatting.opacity_threshold = 0.9;
     let headless = headless(Backend::Cpu);
-    let merged = Image::merge(parts(&headless, &volume, &scene, 3)).unwrap();
+    let merged = Image::merge(parts(headless, &volume, &scene, 3)).unwrap();
     scene.splatting.culling = false;
     let whole = headless.render_volume(Arc::clone(&volume), &scene).unwrap().image;
     let difference = largest_difference(&merged, &whole);
@@ -324,7 +336,7 @@ fn pairs_are_joined() {
     let headless = headless(Backend::Cpu);
     for compositing in COMPOSITINGS {
         scene.splatting.compositing = compositing;
-        let parts = parts(&headless, &volume, &scene, 5);
+        let parts = parts(headless, &volume, &scene, 5);
         let at_once = Image::merge(parts.clone()).unwrap();
         let mut joined = Vec::new();
         for region in parts.chunks(5) {

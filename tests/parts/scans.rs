@@ -29,7 +29,7 @@ fn shared_parts_of_an_opaque_head_merge() {
             let headless = headless(Backend::Cpu);
             let whole = headless.render_volume(Arc::clone(volume), &scene).unwrap().image;
             // Eight slab ranges of four regions.
-            let parts = parts(&headless, volume, &scene, 8);
+            let parts = parts(headless, volume, &scene, 8);
             assert_eq!(parts.len(), 32);
             let what = format!("{classification} {compositing}");
             let shown = whole.pixels.iter().filter(|pixel| **pixel != whole.pixels[0]).count();

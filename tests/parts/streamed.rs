@@ -270,7 +270,7 @@ fn parts_of_boxes_merge() {
     let store = MemoryStore::new(&volume, UVec3::splat(12));
     let mut view = headless.view(streamed(&volume, store, 1 << 20), &scene).unwrap();
     let whole = headless.draw(&mut view).unwrap().image;
-    let parts = in_four(&headless, &mut view);
+    let parts = in_four(headless, &mut view);
     assert_at_most(largest_difference(&Image::merge(parts).unwrap(), &whole), 1e-6, "parts");
 }
 

@@ -225,7 +225,7 @@ fn check(gpu: &GpuHeadless, size: [u32; 2], bands: usize) {
 fn every_compositing_and_order() {
     let gpu = gpu();
     for size in [[1, 1], [16, 16], [61, 37], [130, 5], [7, 100], [64, 64]] {
-        check(&gpu, size, 1);
+        check(gpu, size, 1);
     }
 }
 
@@ -250,5 +250,5 @@ fn no_tile_listed() {
         tiles: Vec::new(),
         stale: 0xdead_beef,
     };
-    case.check(&case.run(&gpu, &Composite::default(), 1));
+    case.check(&case.run(gpu, &Composite::default(), 1));
 }

@@ -117,7 +117,7 @@ fn check(gpu: &GpuHeadless, size: [u32; 2], band_count: usize) {
 
 #[test]
 fn images_are_added_or_the_nearest_is_taken() {
-    check(&gpu(), [61, 37], 1);
+    check(gpu(), [61, 37], 1);
 }
 
 #[test]

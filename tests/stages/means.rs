@@ -184,7 +184,7 @@ fn any_sheets_of_any_view() {
             if seen.scene.splatting.order == Order::BackToFront {
                 groups.reverse();
             }
-            let actual = composited(&gpu, &stage, (&grid, &seen), &groups);
+            let actual = composited(gpu, &stage, (&grid, &seen), &groups);
             let expected = expected(&seen, &groups);
             // What is stored while no surface has been reached is not visible.
             let shown =

@@ -154,7 +154,7 @@ fn occluded_where_the_whole_box_is_opaque() {
         // A box is never wider than the image, because `reach` is at most its size.
         let reach = size.map(|side: u32| side.min(random.uniform(0.0, most + 1.0) as u32));
         let targets = Targets::new(gpu.device(), size, TextureFormat::Rgba32Float, 1).unwrap();
-        let fixture = Fixture { gpu: &gpu, stage: &stage, reach, targets };
+        let fixture = Fixture { gpu, stage: &stage, reach, targets };
         let [columns, rows] = tile_grid(size);
         let mut mask = Mask::random(&mut random, size);
         let words = fixture.run(&mask, &(0..columns * rows).rev().collect::<Vec<_>>());
@@ -183,7 +183,7 @@ fn tiles_that_are_not_listed_stay() {
     for stale in [&targets.opaque_columns, &targets.occluded] {
         gpu.queue().write_buffer(stale, 0, bytemuck::cast_slice(&vec![0x0f0f_0f0f_u32; stale.size() as usize / 4]));
     }
-    let fixture = Fixture { gpu: &gpu, stage: &stage, reach: [0, 5], targets };
+    let fixture = Fixture { gpu, stage: &stage, reach: [0, 5], targets };
     let mask = Mask { size, bits: vec![true; 150 * 75] };
     let listed = [3, 6, 14];
     let words = fixture.run(&mask, &listed);

@@ -96,7 +96,7 @@ fn check(gpu: &GpuHeadless, size: [u32; 2], bands: usize) {
 
 #[test]
 fn over_every_kind_of_background() {
-    check(&gpu(), [61, 37], 1);
+    check(gpu(), [61, 37], 1);
 }
 
 #[test]

@@ -122,7 +122,7 @@ pub(crate) fn place_error(view: &ViewGeometry, voxel: UVec3, center: DVec2) -> D
 
 /// Culls a frame, group by group, and compares the splat record of every voxel on the screen with the f64 evaluation.
 fn check(name: &str, volume: &Volume, scene: &Scene) {
-    let shaded = shaded(&gpu(), name, volume, scene);
+    let shaded = shaded(gpu(), name, volume, scene);
     assert!(shaded > 50, "{name}: {shaded} voxels");
 }
 
@@ -296,7 +296,7 @@ fn any_eye_and_slices() {
                 if method == Method::ImageAligned || !random.bits().is_multiple_of(3) {
                     scene.camera = random_eye(&mut random, volume.grid());
                 }
-                all += shaded(&gpu, &format!("{method:?} {light:?} {spacing:?} {:?}", scene.camera), &volume, &scene);
+                all += shaded(gpu, &format!("{method:?} {light:?} {spacing:?} {:?}", scene.camera), &volume, &scene);
             }
         }
     }

@@ -150,7 +150,7 @@ fn lists_are_those_of_the_rules() {
         let reach: [u32; 2] = reaches[case / sizes.len() % reaches.len()];
         let reach = [reach[0].min(size[0]), reach[1].min(size[1])];
         let case = Case::random(&mut random, size, reach);
-        case.check(&gpu, &stage, random.bits() as u32 % 5);
+        case.check(gpu, &stage, random.bits() as u32 % 5);
         if case.culling {
             lengths[0] += case.composited().len();
             lengths[1] += case.occluding().len();
@@ -174,7 +174,7 @@ fn lists_of_planes_are_those_of_the_rules() {
         let order = random.pick(&[Order::FrontToBack, Order::BackToFront]);
         let last = (0..case.touched.len()).map(|_| random.pick(&[0, NUMBER - 2, NUMBER - 1, NUMBER, NUMBER + 1]));
         case.planes = Some((last.collect(), order));
-        case.check(&gpu, &stage, random.bits() as u32 % 5);
+        case.check(gpu, &stage, random.bits() as u32 % 5);
         behind += case.composited().iter().filter(|&&tile| case.tiles && !case.touched[tile as usize]).count();
     }
     assert!(behind > 100, "{behind}");
@@ -201,6 +201,6 @@ fn margins_are_the_reach_in_whole_tiles() {
             })
             .collect();
         assert_eq!(case.occluding(), expected, "{reach:?}");
-        case.check(&gpu, &stage, 0);
+        case.check(gpu, &stage, 0);
     }
 }

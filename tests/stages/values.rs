@@ -60,7 +60,7 @@ fn check(name: &str, values: &[f32], format: ValueFormat) {
     let gpu = gpu();
     assert_eq!(ValueFormat::of(values.into()), format, "{name}");
     for side in SIDES {
-        let seen = seen(&gpu, values.into(), side);
+        let seen = seen(gpu, values.into(), side);
         let differs = (0..values.len()).find(|&at| seen[at].to_bits() != values[at].to_bits());
         assert_eq!(differs.map(|at| (at, values[at], seen[at])), None, "{name}, side {side}");
     }
@@ -122,7 +122,7 @@ fn holes_are_told_by_their_bits() {
         &format!("select(bitcast<u32>(value_at(at)), {MARK}u, is_hole(stored_at(at)))"),
     );
     assert_ne!(marked, READ);
-    let seen = seen_by(&gpu, &marked, volume.values(), SIDES[0]);
+    let seen = seen_by(gpu, &marked, volume.values(), SIDES[0]);
     for (seen, value) in seen.into_iter().zip(values) {
         let expected = if value.is_finite() { value.to_bits() } else { MARK };
         assert_eq!(seen.to_bits(), expected, "{value}");

@@ -188,7 +188,7 @@ fn pixels_with_the_kernels_gradient_are_the_twins() {
         scene.shading.gradient = Gradient::Kernel;
         let volume = head([1.0, 0.8, 1.6], false);
         let kernel = |prepared: &Prepared<'_>, twin: &Frame<'_>| check_rays(prepared, twin, Rays::default(), 90.0);
-        with_case(&gpu, ("the kernel's gradient", &volume, &scene), kernel);
+        with_case(gpu, ("the kernel's gradient", &volume, &scene), kernel);
     }
 }
 
@@ -213,7 +213,7 @@ fn cut_pixels_and_first_hits_are_the_twins() {
         let host = Host { surfaces: Some(&depths), first_hit };
         let rays = Rays { surfaces: Some(&depths), first_hit };
         let check = |prepared: &Prepared<'_>, twin: &Frame<'_>| check_rays(prepared, twin, rays, 90.0);
-        with_host(&gpu, host, ("cut", &volume, &scene), check);
+        with_host(gpu, host, ("cut", &volume, &scene), check);
     }
 }
 
@@ -230,7 +230,7 @@ fn pixels_are_the_twins() {
             // A surface is only drawn front to back.
             let is_reversed = !has_holes && compositing != Compositing::Surface;
             scene.splatting.order = if is_reversed { Order::BackToFront } else { Order::FrontToBack };
-            with_case(&gpu, (name, &volume, &scene), check);
+            with_case(gpu, (name, &volume, &scene), check);
         }
     }
 }
@@ -249,6 +249,6 @@ fn labels_and_gradient_opacity_are_the_twins() {
     scene.transfer.labels.insert(1, tables);
     for compositing in [Compositing::Linear, Compositing::Surface] {
         scene.splatting.compositing = compositing;
-        with_case(&gpu, ("labels", &volume, &scene), check);
+        with_case(gpu, ("labels", &volume, &scene), check);
     }
 }

@@ -149,5 +149,5 @@ fn check(prepared: &Prepared<'_>, twin: &Frame<'_>) {
 
 #[test]
 fn planes_are_the_twins() {
-    each_case(&gpu(), check);
+    each_case(gpu(), check);
 }

@@ -164,7 +164,7 @@ fn pixels_are_the_twins() {
     for (name, volume, mut scene) in cases() {
         for compositing in BY_AMOUNTS {
             (scene.splatting.compositing, scene.splatting.culling) = (compositing, false);
-            with_case(&gpu, (name, &volume, &scene), |prepared, twin| check(prepared, twin, &stage, None));
+            with_case(gpu, (name, &volume, &scene), |prepared, twin| check(prepared, twin, &stage, None));
         }
     }
 }
@@ -185,12 +185,12 @@ fn chosen_numbers_and_surfaces_are_the_twins() {
         let mut scene = shown_by(compositing, projection);
         scene.splatting.culling = false;
         let head = uneven(&head([1.0, 1.3, 2.0], projection.is_none()));
-        with_case(&gpu, ("head", &head, &scene), |prepared, twin| check(prepared, twin, &stage, None));
+        with_case(gpu, ("head", &head, &scene), |prepared, twin| check(prepared, twin, &stage, None));
         scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.6), (40.0, 1.0)]).unwrap());
         cut(&mut scene);
         let first_hit = (compositing != Compositing::Minimum).then_some(0.15);
         let host = Host { first_hit, ..Host::default() };
-        with_host(&gpu, host, ("cut", &head, &scene), |prepared, twin| check(prepared, twin, &stage, first_hit));
+        with_host(gpu, host, ("cut", &head, &scene), |prepared, twin| check(prepared, twin, &stage, first_hit));
     }
 }
 
@@ -211,13 +211,13 @@ fn cut_pixels_first_hits_and_labels_are_the_twins() {
         let own =
             LabelTables { opacity: Some(Ramp::new(vec![(60.0, 0.0), (90.0, 0.9)]).unwrap()), ..LabelTables::default() };
         scene.transfer.labels.insert(1, own);
-        with_case(&gpu, ("labels", &labelled, &scene), |prepared, twin| check(prepared, twin, &stage, None));
+        with_case(gpu, ("labels", &labelled, &scene), |prepared, twin| check(prepared, twin, &stage, None));
         let mut scene = head_scene(projection);
         (scene.splatting.compositing, scene.splatting.culling) = (compositing, false);
         cut(&mut scene);
         let first_hit = Some(0.15);
         let host = Host { first_hit, ..Host::default() };
-        with_host(&gpu, host, ("cut", &head, &scene), |prepared, twin| check(prepared, twin, &stage, first_hit));
+        with_host(gpu, host, ("cut", &head, &scene), |prepared, twin| check(prepared, twin, &stage, first_hit));
     }
 }
 
@@ -227,7 +227,7 @@ fn bands_change_no_bit() {
     let (gpu, stage) = (gpu(), Gather::default());
     let mut scene = head_scene(None);
     scene.splatting.compositing = Compositing::Exponential;
-    with_case(&gpu, ("bands", &head([1.0; 3], true), &scene), |prepared, _| {
+    with_case(gpu, ("bands", &head([1.0; 3], true), &scene), |prepared, _| {
         let whole = gathered(prepared, &stage, Some(0.15), u32::MAX);
         let rows = 2 * patch_bins::PATCH[1];
         assert!(rows < prepared.view.size[1]);

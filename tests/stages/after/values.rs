@@ -88,5 +88,5 @@ fn check(prepared: &Prepared<'_>, _: &Frame<'_>) {
 
 #[test]
 fn records_are_the_voxels() {
-    each_case(&gpu(), check);
+    each_case(gpu(), check);
 }

@@ -364,7 +364,7 @@ fn dense_bricks() {
         for _ in 0..6 {
             let case = dense(&mut random, sheets, true);
             let masks = masks(&mut random, [case.scene.image.width, case.scene.image.height]);
-            let seen = case.check(&gpu, &stage, &masks);
+            let seen = case.check(gpu, &stage, &masks);
             all.add(&seen);
         }
     }
@@ -391,7 +391,7 @@ fn any_eye_and_slices() {
                 case.scene.camera = random_eye(&mut random, &case.grid);
             }
             let masks = masks(&mut random, [case.scene.image.width, case.scene.image.height]);
-            let seen = case.check(&gpu, &stage, &masks);
+            let seen = case.check(gpu, &stage, &masks);
             all.add(&seen);
         }
     }
@@ -417,7 +417,7 @@ fn planes_of_any_eye() {
             case.scene.camera = random_eye(&mut random, &case.grid);
         }
         let masks = masks(&mut random, [case.scene.image.width, case.scene.image.height]);
-        let seen = case.check(&gpu, &stage, &masks);
+        let seen = case.check(gpu, &stage, &masks);
         all.add(&seen);
     }
     println!("{all:?}");
@@ -433,7 +433,7 @@ fn culling_off() {
         let stage = Cull::new(gpu.device(), sheets);
         let case = dense(&mut random, sheets, false);
         let size = [case.scene.image.width, case.scene.image.height];
-        let seen = case.check(&gpu, &stage, &[Occluded::new(size, true)]);
+        let seen = case.check(gpu, &stage, &[Occluded::new(size, true)]);
         assert!(seen.drawn > 1000, "{seen:?}");
     }
 }
@@ -464,7 +464,7 @@ fn many_bricks() {
         scene.splatting.slab_width = 8.0;
         let masks = masks(&mut random, [150, 77]);
         let case = Case { grid, voxels: chosen.into_iter().collect(), scene, kind: Groups::Sheets(sheets) };
-        let seen = case.check(&gpu, &stage, &masks);
+        let seen = case.check(gpu, &stage, &masks);
         assert!(seen.most_bricks > least && seen.drawn > 1000, "{seen:?}");
     }
 }

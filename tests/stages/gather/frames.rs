@@ -97,7 +97,7 @@ fn frames() {
                 let values = volume.values().iter().map(sample).collect();
                 volume = Volume::new("holes", dims, volume.spacing(), values).unwrap();
             }
-            let fixture = Fixture::new(&gpu, &stage, scene, volume);
+            let fixture = Fixture::new(gpu, &stage, scene, volume);
             let (actual, expected) = (fixture.draw_all().acc, fixture.twin());
             let errors: Vec<f64> =
                 actual.iter().zip(&expected).flat_map(|(actual, expected)| (*actual - *expected).to_array()).collect();
@@ -129,7 +129,7 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
         let mut scene = Scene { transfer, camera: camera([0.3, 0.9, -0.2], 40.0), ..scene(101, 77) };
         (scene.splatting.order, scene.splatting.opacity_threshold) = (order, 0.8);
         scene.splatting.compositing = compositing;
-        let fixture = Fixture::new(&gpu, &stage, scene, volume);
+        let fixture = Fixture::new(gpu, &stage, scene, volume);
         let bins = fixture.bins();
         assert!(bins.groups > 8, "{}", bins.groups);
         let whole = fixture.draw(&bins, None, &fixture.empty(), u32::MAX);
@@ -171,7 +171,7 @@ fn the_minimum_extends_behind_all_bricks() {
     let mut scene = Scene { camera: camera([0.0, 1.0, 0.0], 200.0), ..scene(17, 17) };
     scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.5)]);
     scene.splatting.compositing = Compositing::Minimum;
-    let fixture = Fixture::new(&gpu, &stage, scene, volume);
+    let fixture = Fixture::new(gpu, &stage, scene, volume);
     let bins = fixture.bins();
     let bricks = bins.starts().windows(2).map(|group| group[1] - group[0]).max().unwrap();
     let passes = Passes { most: bins.passes.per_group + bricks * bins.passes.per_brick, ..bins.passes };
@@ -195,7 +195,7 @@ fn more_voxels_than_the_queue_holds() {
         let (volume, transfer) = noise(&mut random, UVec3::splat(24), [1.0; 3], 0.05, 4);
         let mut scene = Scene { transfer, camera: camera([0.3, 0.9, -0.2], 26.0), ..scene(33, 17) };
         (scene.splatting.slab_width, scene.splatting.order, scene.splatting.culling) = (slab_width, order, false);
-        let fixture = Fixture::new(&gpu, &stage, scene, volume);
+        let fixture = Fixture::new(gpu, &stage, scene, volume);
         let bins = fixture.bins();
         let bricks = bins.starts().windows(2).map(|bin| bin[1] - bin[0]).max().unwrap();
         // The queue holds a few hundred voxels; two thirds of all voxels are drawn.
@@ -223,7 +223,7 @@ fn hidden_behind_what_is_there() {
             scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1e-6)]);
             let values = vec![1.0; 8 * 9 * 7];
             let volume = Volume::new("dense", UVec3::new(8, 9, 7), DVec3::from(frame.1), values).unwrap();
-            let fixture = Fixture::new(&gpu, &stage, scene, volume);
+            let fixture = Fixture::new(gpu, &stage, scene, volume);
             let open = open_pixels(&mut random, fixture.seen.view.size);
             let mut acc = vec![DVec4::ONE; fixture.empty().len()];
             for &[x, y] in &open {

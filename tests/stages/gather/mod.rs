@@ -202,7 +202,7 @@ fn sections() {
             scene.splatting.compositing = Compositing::Xray;
             let at = DVec2::new(random.uniform(-2.0, 72.0), random.uniform(-2.0, 47.0));
             look_at(&mut scene, volume.grid(), UVec3::ZERO, at);
-            let fixture = Fixture::new(&gpu, &stage, scene, volume);
+            let fixture = Fixture::new(gpu, &stage, scene, volume);
             let Seen { view, kernel, .. } = &fixture.seen;
 
             // The f64 splat is at the f32 position of the voxel, at any depth.

@@ -211,7 +211,7 @@ fn for_random_sections(
 ) {
     let gpu = gpu();
     let mut random = Random(3);
-    for stage in GROUPS.map(|sheets| Stages::new(&gpu, sheets)) {
+    for stage in GROUPS.map(|sheets| Stages::new(gpu, sheets)) {
         for (kernel, view) in KERNELS.into_iter().flat_map(|kernel| VIEWS.map(|view| (kernel, view))) {
             for &width in widths {
                 let fixture = Fixture::new(&stage, view_scene(view, kernel, width, form), view.1);
@@ -292,7 +292,7 @@ fn any_eye_and_slices() {
         .flat_map(|method| [FootprintForm::SummedArea, FootprintForm::Sections].map(|form| (method, form)))
     {
         let (mut lit, mut cut, mut worst) = (0, 0, 0.0_f64);
-        for stage in GROUPS.map(|sheets| Stages::new(&gpu, sheets)) {
+        for stage in GROUPS.map(|sheets| Stages::new(gpu, sheets)) {
             for _ in 0..16 {
                 let (grid, scene) = random_view(&mut random, method, form);
                 let fixture = Fixture::over(&stage, scene, &grid);
@@ -340,7 +340,7 @@ fn any_eye_and_slices() {
 #[test]
 fn pixels_just_inside_the_rim_are_drawn() {
     let gpu = gpu();
-    let stages = GROUPS.map(|sheets| Stages::new(&gpu, sheets));
+    let stages = GROUPS.map(|sheets| Stages::new(gpu, sheets));
     for (form, stage) in [FootprintForm::SummedArea, FootprintForm::Sections]
         .into_iter()
         .flat_map(|form| stages.iter().map(move |stage| (form, stage)))

@@ -17,7 +17,7 @@ use crate::section::{AMOUNT, VIEWS, view_scene};
 #[test]
 fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
     let gpu = gpu();
-    let stages = GROUPS.map(|sheets| Stages::new(&gpu, sheets));
+    let stages = GROUPS.map(|sheets| Stages::new(gpu, sheets));
     let mut random = Random(11);
     let views = [
         ([0.0, 1.0, 0.0], [1.0, 1.0, 1.0], 0.16),
@@ -83,7 +83,7 @@ fn sections_sum_to_the_footprint_and_the_footprint_to_one() {
 fn instances_add_up() {
     let gpu = gpu();
     let mut random = Random(5);
-    for stage in GROUPS.map(|sheets| Stages::new(&gpu, sheets)) {
+    for stage in GROUPS.map(|sheets| Stages::new(gpu, sheets)) {
         let scene = view_scene(VIEWS[0], (2.0, 2.0), 1.0, FootprintForm::SummedArea);
         let fixture = Fixture::new(&stage, scene, VIEWS[0].1);
         let splats: Vec<_> = (0..300)
@@ -114,7 +114,7 @@ fn instances_add_up() {
 fn listed_tiles_are_zeroed_and_no_others() {
     let gpu = gpu();
     let mut random = Random(6);
-    for (stage, form) in GROUPS.map(|sheets| Stages::new(&gpu, sheets)).iter().zip([
+    for (stage, form) in GROUPS.map(|sheets| Stages::new(gpu, sheets)).iter().zip([
         FootprintForm::SummedArea,
         FootprintForm::Sections,
         FootprintForm::SummedArea,
