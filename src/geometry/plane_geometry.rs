@@ -18,8 +18,15 @@ const WIDEST: f64 = 16.0;
 pub struct Reach {
     /// Along each axis, in whole voxels.
     pub along: UVec3,
-    /// The greatest square of their distance in voxels; nothing where kernels are very wide.
+    /// The greatest square of their distance in voxels; nothing where all voxels of a brick are taken together, as where kernels are very wide.
     pub squared: Option<u32>,
+}
+
+impl Reach {
+    /// Where channels share sheets whole bricks are taken, since tiles find the voxels of all at once, and know of a brick which channels have it.
+    pub fn sharing(self, channels: usize) -> Self {
+        Self { squared: self.squared.filter(|_| channels == 1), ..self }
+    }
 }
 
 /// The planes of a view.

@@ -90,18 +90,19 @@ impl PendingCounts {
     /// # Errors
     /// If the device was lost in the meantime.
     pub fn try_get(&self) -> Option<Result<(Counts, StageTimes), RenderError>> {
-        self.arrival.try_recv().ok().map(|result| self.arrived(result))
+        self.arrival.try_recv().ok().map(|news| self.arrived(news))
     }
 
-    /// The counts of a frame that is done, after the device was polled. Another thread that polled it, too, may still be bringing them.
-    pub(crate) fn get(&self) -> Result<(Counts, StageTimes), RenderError> {
-        let missing = |_| RenderError::Readback("the frame's counts did not arrive".to_owned());
-        self.arrived(self.arrival.recv().map_err(missing)?)
+    /// Where the device tells, once it was polled after the frame was done, that [`Self::arrived`] has them. Another thread that polled it, too, may be the
+    /// one that brings this news.
+    pub(crate) fn arrival(&self) -> &Receiver<Result<(), BufferAsyncError>> {
+        &self.arrival
     }
 
-    fn arrived(&self, result: Result<(), BufferAsyncError>) -> Result<(Counts, StageTimes), RenderError> {
+    /// The counts, after this news.
+    pub(crate) fn arrived(&self, news: Result<(), BufferAsyncError>) -> Result<(Counts, StageTimes), RenderError> {
         let failed = |reason: String| RenderError::Readback(reason);
-        result.map_err(|error| failed(error.to_string()))?;
+        news.map_err(|error| failed(error.to_string()))?;
         let Staging { buffer, timestamps, stages, period } = &self.staging;
         let bytes = buffer.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
         let (counts, times) = bytes.split_at(*timestamps as usize);

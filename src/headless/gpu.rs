@@ -198,7 +198,9 @@ impl GpuHeadless {
             self.queue.submit([encoder.finish()]);
             pending.request();
             wait(&self.device)?;
-            pending.get()
+            let missing = |_| RenderError::Readback("the pick did not arrive".to_owned());
+            let news = pending.request().recv().map_err(missing)?;
+            pending.arrived(news)
         })?
     }
 
@@ -248,7 +250,9 @@ impl GpuHeadless {
         target_bytes: u64,
         [prepare_ms, frame_ms]: [f64; 2],
     ) -> Result<Stats, RenderError> {
-        let (counts, stages_ms) = counts.ok_or_else(no_frame)?.get()?;
+        let counts = counts.ok_or_else(no_frame)?;
+        let missing = |_| RenderError::Readback("the frame's counts did not arrive".to_owned());
+        let (counts, stages_ms) = counts.arrived(counts.arrival().recv().map_err(missing)?)?;
         let info = self.adapter.get_info();
         let ImageSettings { width, height, .. } = view.scene().image;
         Ok(Stats {

@@ -96,7 +96,8 @@ impl After {
             perspective.eye.near = if slab >= 1.0 { slab } else { 0.5 } * seen.slabs.width;
         }
         let bearing = Bearing::of(splatting.compositing);
-        let needs = BrickNeeds { reach: planes.reach(seen), coefficients, bearing };
+        let reach = planes.reach(seen).sharing(layer.channels.len());
+        let needs = BrickNeeds { reach, coefficients, bearing };
         Ok(Self { view, planes, numbers, needs, gradient: scene.shading.gradient })
     }
 }

@@ -57,23 +57,13 @@ impl PendingPick {
     /// # Errors
     /// If the device was lost in the meantime.
     pub fn try_get(&mut self) -> Option<Result<Option<Pick>, RenderError>> {
-        let result = self.requested().try_recv().ok()?;
-        Some(self.arrived(result))
+        let news = self.request().try_recv().ok()?;
+        Some(self.arrived(news))
     }
 
-    /// Requests the point, once the encoder was submitted.
-    pub(crate) fn request(&mut self) {
-        self.requested();
-    }
-
-    /// The point that was requested, after its work is done and the device was polled. Another thread that polled it, too, may still be bringing it.
-    pub(crate) fn get(mut self) -> Result<Option<Pick>, RenderError> {
-        let missing = |_| RenderError::Readback("the pick did not arrive".to_owned());
-        let result = self.requested().recv().map_err(missing)?;
-        self.arrived(result)
-    }
-
-    fn requested(&mut self) -> &Receiver<Result<(), BufferAsyncError>> {
+    /// Requests the point, once the encoder was submitted. The device tells there, once it was polled after its work was done, that [`Self::arrived`] has it;
+    /// another thread that polled it, too, may be the one that brings this news.
+    pub(crate) fn request(&mut self) -> &Receiver<Result<(), BufferAsyncError>> {
         self.arrival.get_or_insert_with(|| {
             let (sender, arrival) = channel();
             self.staging.map_async(MapMode::Read, .., move |result| {
@@ -84,9 +74,10 @@ impl PendingPick {
         })
     }
 
-    fn arrived(&self, result: Result<(), BufferAsyncError>) -> Result<Option<Pick>, RenderError> {
+    /// The point, after this news.
+    pub(crate) fn arrived(&self, news: Result<(), BufferAsyncError>) -> Result<Option<Pick>, RenderError> {
         let failed = |reason: String| RenderError::Readback(reason);
-        result.map_err(|error| failed(error.to_string()))?;
+        news.map_err(|error| failed(error.to_string()))?;
         let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
         let depth: f32 = bytemuck::pod_read_unaligned(&bytes[..4]);
         let of = (&*self.volume, &self.transfer);

@@ -10,11 +10,12 @@ use super::Frame;
 use super::pixel::Pixel;
 use super::slab_integral::is_visible;
 use crate::error::RenderError;
+use crate::image::channels::Joining;
 use crate::lists::quad_plan::tile_grid;
 use crate::parallel::prelude::*;
 use crate::reference::Host;
 use crate::scene::Scene;
-use crate::settings::splatting::Compositing;
+use crate::settings::splatting::{Classification, Compositing};
 use crate::settings::transfer_function::{Tables, TransferFunction};
 use crate::stats::Counts;
 use crate::volume::Volume;
@@ -47,7 +48,9 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
 /// The counts of the frames of all channels, each of whose fields is drawn by itself. No voxel is shaded, because pixels are shaded instead.
 pub(super) fn count_in(frames: &[Frame]) -> Counts {
     let frame = &frames[0];
-    let drawn: Vec<Vec<Vec<UVec3>>> = frames.iter().map(drawn_bricks).collect();
+    // Where channels share sheets, all of a brick may be drawn.
+    let shares = frames.len() > 1 && Joining::of(frame.scene.splatting.compositing, Classification::After).is_none();
+    let drawn: Vec<Vec<Vec<UVec3>>> = frames.iter().map(|frame| drawn_bricks(frame, shares)).collect();
     let pairs = frames.iter().zip(&drawn).flat_map(|(frame, bricks)| bricks.iter().map(move |brick| (frame, brick)));
     let counts = pairs.map(|(frame, brick)| {
         let sections = brick.iter().map(|voxel| planes(frame, *voxel)).sum();
@@ -68,8 +71,8 @@ pub(super) fn count_in(frames: &[Frame]) -> Counts {
     }
 }
 
-/// The voxels of a channel that may be drawn, by brick, without holes.
-fn drawn_bricks(frame: &Frame) -> Vec<Vec<UVec3>> {
+/// The voxels of a channel, which shares sheets with others or does not, that may be drawn, by brick, without holes.
+fn drawn_bricks(frame: &Frame, shares: bool) -> Vec<Vec<UVec3>> {
     let grid = &frame.geometry.grid;
     let reach = reach(frame);
     let tables = tables(frame);
@@ -85,7 +88,7 @@ fn drawn_bricks(frame: &Frame) -> Vec<Vec<UVec3>> {
             let squared = |other: UVec3| other.as_dvec3().distance_squared(voxel.as_dvec3());
             let is_near = |other| squared(other) < reach.distance * reach.distance - ROUNDING;
             let around = || values(frame, (voxel, voxel + 1), DVec3::splat(reach.distance), is_near);
-            !frame.volume.value(voxel).is_nan() && (reach.distance > WIDEST || shows(around()))
+            !frame.volume.value(voxel).is_nan() && (shares || reach.distance > WIDEST || shows(around()))
         };
         voxels(first, end).filter(is_drawn).collect()
     };
