@@ -75,9 +75,10 @@ impl Layer {
                 Frame::new(volume.grid(), voxels, scene, view, host, level).draw(level)
             }
             List::After(coefficients) => {
+                let sharing = coefficients.len();
                 for (of, coefficients) in channels(volume, transfer).zip(&mut *coefficients) {
                     coefficients.prepare(of.0, scene);
-                    coefficients.look(of, scene.splatting.compositing, &view);
+                    coefficients.look(of, scene.splatting.compositing, &view, sharing);
                 }
                 let frames = channels(volume, transfer).zip(&*coefficients).enumerate();
                 let frame = |(number, ((volume, transfer), coefficients))| {
@@ -159,7 +160,9 @@ pub(super) fn draw(layers: &mut [Layer], scene: &Scene, view: ViewGeometry, host
         joining.join((&mut all.content.colors, &mut all.first_hits), (&content.colors, &first_hits));
         all.counts.add_channel(&counts);
     }
-    joining.finish(&mut all.content.colors, scene.image.background);
+    // Parts have no background yet.
+    let background = if host.is_part { [0.0; 4] } else { scene.image.background };
+    joining.finish(&mut all.content.colors, background);
     if host.first_hit.is_none() {
         all.first_hits.clear();
     }

@@ -1,10 +1,12 @@
 //! Where values can meet an opacity: two bits for every cell of 1×1×1 voxels between neighbouring voxels.
 //!
 //! The value at a point is a mean of the coefficients within the kernel's radius, which all points of a cell take from one box of voxels. A slab shows
-//! nothing where no voxel in the boxes of its two points reaches the least value with an opacity, or none is as low as the greatest one.
+//! nothing where no voxel in the boxes of its two points reaches the least value with an opacity, or none is as low as the greatest one. Nor does it where
+//! no mean does, as voxels beyond a cell's corners have little weight.
 
 use glam::DVec3;
 
+use super::bounds::Bounds;
 use crate::after::normalization::Normalization;
 use crate::parallel::prelude::*;
 use crate::volume::{Grid, Sample, ValueSlice, for_type};
@@ -61,6 +63,23 @@ impl Cells {
             join(&mut bits, (stride, count), half[axis] as usize, work);
         }
         Self { bits }
+    }
+
+    /// Without the bits of cells whose means do not reach the least number with an opacity, or do not stay below the greatest one.
+    pub(super) fn within(
+        mut self,
+        bounds: &Bounds,
+        of: (&Grid, ValueSlice<'_>, &Normalization),
+        [low, high]: [f32; 2],
+    ) -> Self {
+        let [least, greatest] = of.2.range;
+        if low > least {
+            bounds.clear((&mut self.bits, REACHES), of, (1.0, low - SLACK));
+        }
+        if high < greatest {
+            bounds.clear((&mut self.bits, STAYS), of, (-1.0, -high - SLACK));
+        }
+        self
     }
 
     /// Of eight points, given their cells, which those beyond the volume have in common with the nearest point inside.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::UVec3;
 
+use super::bounds::Bounds;
 use super::cells::{Cells, Work};
 use super::colors::{Colors, ColorsOf};
 use super::differences::{Differences, MAX_VOXELS};
@@ -35,6 +36,8 @@ pub(in crate::cpu) struct Coefficients {
     /// The values as `f32`, which are read faster, once a second frame has been drawn.
     wide: Option<Arc<[f32]>>,
     has_drawn: bool,
+    /// The kernels' radius and falloff.
+    kernel: (f64, f64),
     /// Of volumes of colours.
     colors: Option<Colors>,
     /// Of the values, which only gradients need.
@@ -97,6 +100,7 @@ impl Coefficients {
             exact,
             wide: None,
             has_drawn: false,
+            kernel,
             colors,
             differences: Kept::Unused,
             ranges: None,
@@ -147,15 +151,17 @@ impl Coefficients {
     }
 
     /// Finds the bricks that may be drawn in a view, if that may have changed them. The values around bricks are examined only in a view with new
-    /// reaches; a changed transfer function tests the bricks' ranges, and makes a new list of bricks only if it shows others.
+    /// reaches; a changed transfer function tests the bricks' ranges, and makes a new list of bricks only if it shows others. `sharing` is the number of channels that
+    /// share sheets.
     pub(in crate::cpu) fn look(
         &mut self,
         (volume, transfer): (&Volume, &TransferFunction),
         compositing: Compositing,
         view: &ViewGeometry,
+        sharing: usize,
     ) {
         let (geometry, grid) = (PlaneGeometry::new(view, volume.grid()), volume.grid());
-        let reaches = (geometry.reach(view), geometry.reach_from_cells(view));
+        let reaches = (geometry.reach(view).sharing(sharing), geometry.reach_from_cells(view));
         let is_stale = std::mem::take(&mut self.is_stale);
         let kept = self.ranges.take().filter(|ranges| ranges.reaches == reaches);
         if kept.is_some() && self.shown.is_some() && !is_stale {
@@ -180,7 +186,12 @@ impl Coefficients {
         let wanted = (0..is_wanted.len() as u32).filter(|&brick| is_wanted[brick as usize]).collect();
         let cells = (!is_choice(compositing)).then(|| {
             let shown = Integrals::new(volume.labels().is_some(), transfer, compositing, &self.numbers).shown;
-            Cells::new(grid, self.all(volume), &self.numbers, geometry.widest_half_box(view), shown, Work::Shared)
+            let (all, half_box) = (self.all(volume), geometry.widest_half_box(view));
+            let cells = Cells::new(grid, all, &self.numbers, half_box, shown, Work::Shared);
+            match Bounds::of(half_box, self.kernel).filter(|_| volume.holes() == 0) {
+                Some(bounds) => cells.within(&bounds, (grid, all, &self.numbers), shown),
+                None => cells,
+            }
         });
         self.ranges = Some(ranges);
         self.shown = Some(Shown { bricks, wanted, cells });

@@ -10,6 +10,7 @@
 //!                   composite  its sheet, as where classification comes first
 //! ```
 
+mod bounds;
 mod cells;
 mod classify;
 mod coefficients;
