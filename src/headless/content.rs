@@ -6,6 +6,7 @@ use wgpu::{Buffer, Device, Queue};
 use super::readback;
 use crate::error::RenderError;
 use crate::gpu::layout::Band;
+use crate::image::channels::Joining;
 use crate::part::{Content, Extreme};
 use crate::rasterizer::carried::Carried;
 use crate::renderer::prepared_frame::{Drawing, PreparedFrame};
@@ -27,8 +28,13 @@ pub(super) fn content(
     chosen: Option<Compositing>,
 ) -> Result<Content, RenderError> {
     let mut colors = Vec::with_capacity(region.pixels());
-    for band in &frame.compositing.bands {
+    let image = frame.joined.as_ref().map_or(&frame.compositing, |joined| &joined.compositing);
+    for band in &image.bands {
         read_rows((device, queue), (frame, &band.band), (&band.acc, 0), region, &mut colors)?;
+    }
+    if frame.joined.is_some() {
+        // Images that add up are drawn one by one.
+        Joining::Nearest.finish(&mut colors, [0.0; 4]);
     }
     let extremes = match (chosen, frame.first_drawing().and_then(Drawing::carried)) {
         (Some(Compositing::Average), Some(carried)) => means((device, queue), frame, carried, region, &mut colors)?,

@@ -133,7 +133,7 @@ impl Headless {
     pub fn draw_part(&self, view: &mut HeadlessView, window: &Window) -> Result<(Part, Stats), RenderError> {
         let reads = view.reads;
         let volume = view.volume();
-        if part::joining(volume.sample(), view.scene()).is_some() {
+        if part::adds_up(volume.sample(), view.scene()) {
             let backend = view.backend_ref().backend();
             if backend != self.backend() {
                 return Err(self.refuse(backend).into());

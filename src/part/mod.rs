@@ -133,7 +133,7 @@ impl Identity {
             classification: scene.classification(volume.sample()),
             order: scene.splatting.order,
             background: scene.image.background,
-            images: if joining(volume.sample(), scene).is_some() { volume.sample().channels().count() } else { 1 },
+            images: if adds_up(volume.sample(), scene) { volume.sample().channels().count() } else { 1 },
             means: MeanTables::of(volume.sample(), scene),
         })
     }
@@ -151,10 +151,11 @@ impl Identity {
 /// The most images that are added up.
 const MAX_IMAGES: usize = 256;
 
-/// How the images of a volume's channels become one; `None` if they share sheets, or there is only one.
-pub(crate) fn joining(volume: &Volume, scene: &Scene) -> Option<Joining> {
+/// Whether each of a volume's channels has an image of its own, and these are added up. Of surfaces the nearest is shown, which is also that of the nearest
+/// part that has one, so that their parts are of one image.
+pub(crate) fn adds_up(volume: &Volume, scene: &Scene) -> bool {
     let joining = Joining::of(scene.splatting.compositing, scene.classification(volume));
-    joining.filter(|_| !volume.further().is_empty())
+    joining == Some(Joining::Sum) && !volume.further().is_empty()
 }
 
 /// Checks that a renderer, which draws all channels at once, can draw parts of a scene.
@@ -163,7 +164,7 @@ pub(crate) fn joining(volume: &Volume, scene: &Scene) -> Option<Joining> {
 /// If channels share no sheets.
 #[cfg(any(feature = "cpu", feature = "gpu"))]
 pub(crate) fn check_sheets(volume: &Volume, scene: &Scene) -> Result<(), SettingError> {
-    if joining(volume, scene).is_none() {
+    if !adds_up(volume, scene) {
         return Ok(());
     }
     let compositing = crate::scene::names::name_of(crate::scene::names::COMPOSITINGS, scene.splatting.compositing);
@@ -189,13 +190,8 @@ pub(crate) fn has_labelled_means(volume: &Volume, scene: &Scene) -> bool {
 /// If the scene's method is not image-aligned, an economy is in use, its compositing has no parts, or the window does not lie in the image.
 pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(), SettingError> {
     let splatting = &scene.splatting;
-    if joining(volume, scene) == Some(Joining::Nearest) {
-        // First hits tell which channel is the nearest, and parts do not carry them.
-        let found = "\"surface\" with splatting.classification = \"after\" of several channels for a part of an image";
-        return Err(SettingError::new("splatting.compositing", found, "another compositing, or \"before\" with it"));
-    }
     let channels = volume.channels().count();
-    if joining(volume, scene).is_some() && channels > MAX_IMAGES {
+    if adds_up(volume, scene) && channels > MAX_IMAGES {
         let found = format!("{channels} channels whose images are added up for a part of an image");
         return Err(SettingError::new("volume", found, format!("at most {MAX_IMAGES}")));
     }

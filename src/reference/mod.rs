@@ -216,7 +216,12 @@ pub fn part(
     scene: &Scene,
     window: &Window,
 ) -> Result<Content, RenderError> {
-    if scene.classification(volume) == Classification::After {
+    let classification = scene.classification(volume);
+    let joining = Joining::of(scene.splatting.compositing, classification);
+    if joining == Some(Joining::Nearest) && channels(volume, transfer).nth(1).is_some() {
+        return after::nearest_part(volume, transfer, scene, window);
+    }
+    if classification == Classification::After {
         return after::part(volume, transfer, scene, window);
     }
     before::part(volume, transfer, scene, window)

@@ -156,14 +156,6 @@ fn parts_of_several_channels_merge() {
     for classification in [Classification::Before, Classification::After] {
         for compositing in [Linear, Exponential, Xray, Surface, Maximum, Minimum, Average] {
             for (volume, mut scene) in scenes(compositing, classification, 24).map(with_channel) {
-                if (compositing, classification) == (Surface, Classification::After) {
-                    // First hits tell which channel is the nearest.
-                    let headless = headless(Backend::Cpu);
-                    let mut view = headless.view(volume, &scene).unwrap();
-                    let message = headless.draw_part(&mut view, &SOME).unwrap_err().to_string();
-                    assert!(message.contains("of several channels for a part of an image"), "{message}");
-                    continue;
-                }
                 scene.shading.enabled = !matches!(compositing, Minimum | Maximum);
                 compare(Backend::Cpu, &volume, &scene);
             }
@@ -172,6 +164,32 @@ fn parts_of_several_channels_merge() {
 }
 
 const SOME: Window = Window { slabs: 0..2, region: Region { x: 0, y: 0, width: 4, height: 4 } };
+
+/// Of the surfaces of several channels the nearest one is that of the nearest part that has one.
+#[test]
+fn parts_of_the_nearest_surfaces_merge() {
+    for (volume, mut scene) in scenes(Compositing::Surface, Classification::After, 24).map(with_channel) {
+        // Both channels are seen.
+        let alone = |number: usize| {
+            let mut scene = scene.clone();
+            let nothing = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
+            match number {
+                0 => scene.transfer.opacity = nothing,
+                _ => scene.further[0].transfer.opacity = nothing,
+            }
+            headless(Backend::Cpu).render_volume(Arc::clone(&volume), &scene).unwrap().image
+        };
+        let both = headless(Backend::Cpu).render_volume(Arc::clone(&volume), &scene).unwrap().image;
+        assert!([0, 1].iter().all(|&number| largest_difference(&both, &alone(number)) > 0.2));
+        compare(Backend::Reference, &volume, &scene);
+        for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
+            scene.splatting.rasterizer = rasterizer;
+            compare(Backend::Gpu, &volume, &scene);
+        }
+        let drawn = parts(headless(Backend::Cpu), &volume, &scene, 2);
+        assert!(drawn.iter().all(|part| (part.identity.images, part.further.len()) == (1, 0)));
+    }
+}
 
 /// Where channels share no sheets, a part has pixels for each, and every backend draws them.
 #[test]

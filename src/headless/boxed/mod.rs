@@ -14,11 +14,9 @@ use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
-use crate::image::channels::Joining;
 use crate::part::{self, Content, Extreme, Identity, MergeError, Part};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
-use crate::scene::names::{COMPOSITINGS, name_of};
 use crate::settings::camera::Camera;
 use crate::settings::splatting::{Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
@@ -81,7 +79,7 @@ impl BoxedView {
     /// Draws a frame.
     pub(super) fn draw(&self, headless: &Headless) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        if part::joining(&self.volume.sample, &self.scene).is_some() {
+        if part::adds_up(&self.volume.sample, &self.scene) {
             return joined::draw(&self.volume, &self.scene, headless);
         }
         let size = [self.scene.image.width, self.scene.image.height];
@@ -270,17 +268,12 @@ fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(),
     if backend == Backend::Cpu {
         crate::cpu::check(scene)?;
     }
-    let of = if part::joining(&volume.sample, scene) == Some(Joining::Nearest) {
-        // First hits tell which channel is the nearest, and parts do not carry them.
-        "several channels of a volume"
-    } else if part::has_labelled_means(&volume.sample, scene) {
-        "tables of labels of a volume"
-    } else {
-        return Ok(());
-    };
-    let compositing = name_of(COMPOSITINGS, scene.splatting.compositing);
-    let found = format!("{compositing:?} with splatting.classification = \"after\" for {of} that is streamed");
-    Err(SettingError::new("splatting.compositing", found, "another one, or more memory").into())
+    if part::has_labelled_means(&volume.sample, scene) {
+        let found =
+            "\"average\" with splatting.classification = \"after\" for tables of labels of a volume that is streamed";
+        return Err(SettingError::new("splatting.compositing", found, "another one, or more memory").into());
+    }
+    Ok(())
 }
 
 /// The squares of some side, or what is left of them, that cover a region.

@@ -30,6 +30,7 @@ use glam::{DVec3, UVec2};
 
 use super::{Areas, Buffer, Culled, Geometry, Host, resolve};
 use crate::error::RenderError;
+use crate::image::channels::Joining;
 use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::part::{Content, Extreme};
@@ -173,16 +174,47 @@ fn each_place_in<T: Send>(region: &Region, of: impl Fn(UVec2) -> T + Sync) -> Ve
     pixels.map(|at| of(UVec2::new(x + at % width, y + at / width))).collect()
 }
 
+/// The pixels of a window composited from all channels, row by row.
+fn composite_window(
+    host: Host<'_>,
+    (volume, transfer): (&Volume, &TransferFunction),
+    scene: &Scene,
+    Window { slabs, region }: &Window,
+) -> Result<Vec<Composited>, RenderError> {
+    let mut frames = Frame::of_channels(host, volume, transfer, scene)?;
+    frames.iter_mut().for_each(|frame| frame.slabs = slabs.clone());
+    Ok(composite(&frames, region))
+}
+
+/// The pixels of a part that shows the nearest of the channels' surfaces (SPEC §10).
+pub(super) fn nearest_part(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    window: &Window,
+) -> Result<Content, RenderError> {
+    // All channels share a camera.
+    let scene = scene.framed(volume, transfer);
+    let host = Host { first_hit: Some(1.0), ..Host::default() };
+    let (mut colors, mut hits) = (vec![[0.0; 4]; window.region.pixels()], vec![f64::INFINITY; window.region.pixels()]);
+    for (number, channel) in volume.channels().enumerate().take(1 + transfer.further.len()) {
+        let pixels = composite_window(host, (channel, &transfer.of_channel(number)), &scene, window)?;
+        let own = pixels.iter().map(|pixel| pixel.color.as_vec4().to_array()).collect::<Vec<_>>();
+        let own_hits = pixels.iter().map(|pixel| pixel.first_hit.unwrap_or(f64::INFINITY)).collect::<Vec<_>>();
+        Joining::Nearest.join((&mut colors, &mut hits), (&own, &own_hits));
+    }
+    Joining::Nearest.finish(&mut colors, [0.0; 4]);
+    Ok(Content { colors, extremes: Vec::new() })
+}
+
 /// See [`super::part`].
 pub(super) fn part(
     volume: &Volume,
     transfer: &TransferFunction,
     scene: &Scene,
-    Window { slabs, region }: &Window,
+    window: &Window,
 ) -> Result<Content, RenderError> {
-    let mut frames = Frame::of_channels(Host::default(), volume, transfer, scene)?;
-    frames.iter_mut().for_each(|frame| frame.slabs = slabs.clone());
-    let pixels = composite(&frames, region);
+    let pixels = composite_window(Host::default(), (volume, transfer), scene, window)?;
     let compositing = scene.splatting.compositing;
     let is_mean = |pixel: &Composited| compositing == Compositing::Average && pixel.extreme.counted > Extreme::MIDDLE;
     // Means are classified where parts are merged.
