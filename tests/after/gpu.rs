@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 use sheetsplat::headless::{GpuHeadless, readback};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host};
@@ -298,6 +298,29 @@ fn surfaces_and_first_hits_are_the_twins() {
                 let off = hits.len() - hits.iter().zip(&expected.first_hits).filter(is_close).count();
                 assert!(off <= hits.len() / 400, "{what}: {off} of {} hits", hits.len());
             }
+        }
+    }
+}
+
+/// Voxels that are left out show nothing, even where values have an opacity that hardly differ from those around, as far away as kernels reach.
+#[test]
+fn what_is_left_out_shows_nothing() {
+    let gpu = gpu();
+    let bright =
+        |voxel: UVec3| (voxel.x + 31 * voxel.y + 977 * voxel.z).wrapping_mul(2_654_435_761).is_multiple_of(1600);
+    for spacing in [[1.0, 1.0, 1.0], [1.0, 1.4, 0.8]] {
+        let volume = crate::volume([30, 26, 34], DVec3::from(spacing), |voxel| if bright(voxel) { 255.0 } else { 0.0 });
+        for projection in [None, Some(eye(60.0))] {
+            let mut scene = head([1.0; 3]).1;
+            scene.camera = camera([0.43, 0.87, -0.31], 34.0);
+            scene.camera.projection = projection.unwrap_or(scene.camera.projection);
+            scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (0.4, 0.3)]).unwrap());
+            scene.transfer.color = Some(Ramp::new(vec![(0.0, DVec3::X), (255.0, DVec3::Y)]).unwrap());
+            scene.splatting.compositing = Compositing::Exponential;
+            assert_twins(gpu, (&volume, &scene), 60.0, &format!("{spacing:?} {projection:?}"));
+            let Counts { voxels_in_range, voxels_total, .. } =
+                Drawing::By(Rasterizer::Tiles).render(gpu, &volume, &scene).stats.counts;
+            assert!(voxels_in_range * 2 < voxels_total, "{voxels_in_range} of {voxels_total}");
         }
     }
 }
