@@ -23,7 +23,9 @@ pub fn shown_voxels(
     bearing: Bearing,
 ) -> BrickList {
     let are_shown = ranges.shown(volume, transfer, bearing);
-    let Some(squared) = reach.squared.filter(|_| bearing != Bearing::All) else {
+    // A page is to load little code, and draws whole bricks.
+    let is_told_apart = bearing != Bearing::All && !cfg!(target_arch = "wasm32");
+    let Some(squared) = reach.squared.filter(|_| is_told_apart) else {
         return ranges.brick_list(volume, |brick| are_shown[brick]);
     };
     let (dims, sphere) = (volume.dims(), Sphere::new(squared));

@@ -110,14 +110,17 @@ impl BrickList {
 
     /// The voxels that are not in another list.
     fn without(&self, other: &Self) -> Vec<u32> {
-        let rest = |brick: &Brick| {
+        let mut found = Vec::new();
+        for brick in &self.bricks {
             let number = other.numbers[brick_of(&self.grid, self.grid.index_of(origin(brick))) as usize];
             let others = if number == NONE { 0 } else { present(&other.bricks[number as usize]) };
-            let [low, high] = [others as u32, (others >> 32) as u32];
-            Brick { present: [brick.present[0] & !low, brick.present[1] & !high], ..*brick }
-        };
-        let voxels = |brick: Brick| voxels(&brick).map(|(_, voxel)| self.grid.index_of(voxel)).collect::<Vec<_>>();
-        self.bricks.iter().map(rest).flat_map(voxels).collect()
+            for (slot, voxel) in voxels(brick) {
+                if others >> slot & 1 == 0 {
+                    found.push(self.grid.index_of(voxel));
+                }
+            }
+        }
+        found
     }
 
     /// Whether a voxel is in the list.
