@@ -81,9 +81,8 @@ impl BrickRanges {
         self.ranges.as_ptr().cast()
     }
 
-    /// Whether each brick may be drawn.
-    pub fn shown(&self, volume: &Volume, transfer: &TransferFunction, bearing: Bearing) -> Vec<bool> {
-        let values = values_of(volume, transfer);
+    /// Whether each brick may be drawn, where some values have an opacity.
+    pub fn shown(&self, values: &ValueSet, bearing: Bearing) -> Vec<bool> {
         let is_shown = |&[min, max]: &[f32; 2]| {
             let [low, high] = bearing.range([min, max]);
             min <= max && values.meets(low, high)
@@ -114,7 +113,7 @@ impl BrickRanges {
 }
 
 /// The values that can take part under any of a transfer function's tables.
-pub(super) fn values_of(volume: &Volume, transfer: &TransferFunction) -> ValueSet {
+pub fn values_of(volume: &Volume, transfer: &TransferFunction) -> ValueSet {
     let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
     let tables = labels.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
     tables.fold(ValueSet::default(), |all, tables| all.union(&values_between(&tables)))
@@ -191,12 +190,13 @@ mod tests {
         let opacity = Ramp::new(vec![(49.0, 0.0), (50.0, 1.0), (51.0, 0.0)]).unwrap();
         let transfer = TransferFunction::by_value(Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(), opacity);
         let ranges = BrickRanges::new(&grid, volume.values(), UVec3::splat(5));
-        let shown = ranges.shown(&volume, &transfer, Bearing::Own);
+        let values = values_of(&volume, &transfer);
+        let shown = ranges.shown(&values, Bearing::Own);
         assert_eq!(shown, [false, true, true, true, true, false]);
         assert_eq!(ranges.brick_list(&volume, |brick| shown[brick]).voxels().len(), 4 * 64);
         // A maximum of 100 hides the peak, a minimum of 0 too, and both are in averages.
-        assert_eq!(ranges.shown(&volume, &transfer, Bearing::Greater), [false, true, true, true, true, true]);
-        assert_eq!(ranges.shown(&volume, &transfer, Bearing::Smaller), [true, true, true, true, true, false]);
-        assert_eq!(ranges.shown(&volume, &transfer, Bearing::All), [true; 6]);
+        assert_eq!(ranges.shown(&values, Bearing::Greater), [false, true, true, true, true, true]);
+        assert_eq!(ranges.shown(&values, Bearing::Smaller), [true, true, true, true, true, false]);
+        assert_eq!(ranges.shown(&values, Bearing::All), [true; 6]);
     }
 }

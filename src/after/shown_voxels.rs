@@ -7,22 +7,21 @@
 
 use std::ops::Range;
 
-use super::brick_ranges::{Bearing, BrickRanges, values_of};
+use super::brick_ranges::{Bearing, BrickRanges};
 use super::spheres::{Sphere, VoxelSet};
 use crate::geometry::plane_geometry::Reach;
 use crate::lists::brick::{BrickList, SIDE};
-use crate::lists::iso_range::{END, ordinal};
-use crate::settings::transfer_function::TransferFunction;
+use crate::lists::iso_range::{END, ValueSet, ordinal};
 use crate::volume::{ValueSlice, Volume};
 
-/// The voxels that may be drawn, without holes. The ranges must be those of the coefficients.
+/// The voxels that may be drawn, without holes, where some values have an opacity. The ranges must be those of the coefficients.
 pub fn shown_voxels(
     (ranges, reach): (&BrickRanges, &Reach),
     (volume, coefficients): (&Volume, ValueSlice<'_>),
-    transfer: &TransferFunction,
+    values: &ValueSet,
     bearing: Bearing,
 ) -> BrickList {
-    let are_shown = ranges.shown(volume, transfer, bearing);
+    let are_shown = ranges.shown(values, bearing);
     // A page is to load little code, and draws whole bricks.
     let is_told_apart = bearing != Bearing::All && !cfg!(target_arch = "wasm32");
     let Some(squared) = reach.squared.filter(|_| is_told_apart) else {
@@ -33,13 +32,13 @@ pub fn shown_voxels(
     let set =
         |ordinals: Range<u32>, holds_all: bool| (!holds_all).then(|| VoxelSet::new(dims, coefficients, &ordinals));
     // A range of values is met where a coefficient is at least its start, and one is below its end.
-    let sets: Vec<[Option<VoxelSet>; 2]> = (values_of(volume, transfer).ranges().iter())
+    let sets: Vec<[Option<VoxelSet>; 2]> = (values.ranges().iter())
         .map(|&Range { start, end }| {
             let above = set(start..END, start <= least || bearing == Bearing::Smaller);
             [above, set(0..end, greatest < end || bearing == Bearing::Greater)]
         })
         .collect();
-    let (bricks, values) = (dims.map(|n| n.div_ceil(SIDE)), volume.values());
+    let (bricks, all) = (dims.map(|n| n.div_ceil(SIDE)), volume.values());
     BrickList::by_rows(volume.grid(), &|y, z, flags: &mut [bool]| {
         let first = (bricks.x * (y / SIDE + bricks.y * (z / SIDE))) as usize;
         let are_shown = &are_shown[first..][..bricks.x as usize];
@@ -47,7 +46,7 @@ pub fn shown_voxels(
             return;
         }
         let row = (dims.x * (y + dims.y * z)) as usize;
-        values.slice(row..row + flags.len()).flag(flags, |value| !value.is_nan());
+        all.slice(row..row + flags.len()).flag(flags, |value| !value.is_nan());
         let mut shown = vec![0; flags.len().div_ceil(64)];
         for sets in &sets {
             let mut both = vec![u64::MAX; shown.len()];
@@ -68,7 +67,8 @@ mod tests {
     use glam::{DVec3, UVec3};
 
     use super::*;
-    use crate::settings::transfer_function::Ramp;
+    use crate::after::brick_ranges::values_of;
+    use crate::settings::transfer_function::{Ramp, TransferFunction};
     use crate::volume::Grid;
     use crate::volume::range::{EMPTY, union};
 
@@ -96,7 +96,7 @@ mod tests {
             let transfer = TransferFunction::by_value(color, Ramp::new(opacity.clone()).unwrap());
             let set = values_of(&volume, &transfer);
             for bearing in [Bearing::Own, Bearing::Greater, Bearing::Smaller, Bearing::All] {
-                let are_shown = ranges.shown(&volume, &transfer, bearing);
+                let are_shown = ranges.shown(&set, bearing);
                 let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
                 let is_drawn = |&index: &u32| {
                     let at = grid.voxel_at(index);
@@ -111,14 +111,14 @@ mod tests {
                 };
                 let expected: Vec<u32> = (0..values.len() as u32).filter(is_drawn).collect();
                 let reach = Reach { along, squared: Some(squared) };
-                let found = shown_voxels((&ranges, &reach), (&volume, volume.values()), &transfer, bearing);
+                let found = shown_voxels((&ranges, &reach), (&volume, volume.values()), &set, bearing);
                 let mut found = found.voxels();
                 found.sort_unstable();
                 assert!(found == expected, "{opacity:?}, {bearing:?}");
                 let all = shown_voxels(
                     (&ranges, &Reach { squared: None, ..reach }),
                     (&volume, volume.values()),
-                    &transfer,
+                    &set,
                     bearing,
                 );
                 assert_eq!(all, ranges.brick_list(&volume, |brick| are_shown[brick]));

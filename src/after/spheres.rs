@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use glam::UVec3;
 
+use crate::lists::brick;
 use crate::lists::iso_range::ordinal;
 use crate::parallel::prelude::*;
 use crate::volume::ValueSlice;
@@ -43,7 +44,7 @@ impl VoxelSet {
             let mut flags = vec![false; across];
             let values = values.slice(row * across..(row + 1) * across);
             values.flag(&mut flags, |value| ordinal(value).wrapping_sub(ordinals.start) < length);
-            flags.chunks(WORD).map(packed).collect::<Vec<_>>()
+            flags.chunks(WORD).map(brick::packed).collect::<Vec<_>>()
         };
         let rows = (dims.y * dims.z) as usize;
         Self { dims, words: (0..rows).into_par_iter().with_min_len(16).flat_map_iter(row).collect() }
@@ -86,11 +87,6 @@ fn spread(words: &mut [u64], reach: usize) {
         }
         width += step;
     }
-}
-
-/// Up to a word of flags.
-fn packed(flags: &[bool]) -> u64 {
-    flags.iter().rev().fold(0, |bits, &flag| bits << 1 | u64::from(flag))
 }
 
 #[cfg(test)]

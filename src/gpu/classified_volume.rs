@@ -12,7 +12,7 @@ use crate::gpu::brick_lists::{BrickLists, SettledBricks};
 use crate::gpu::counts::{GroupSlabs, Totals};
 use crate::gpu::gpu_volume::GpuVolume;
 use crate::gpu::ramps::Stored;
-use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks};
+use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks, opaque_values};
 use crate::gpu::volume_texture::OwnColors;
 use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
@@ -163,7 +163,7 @@ impl ClassifiedVolume {
         }
         let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
         let volume = Arc::clone(self.volume());
-        let lists = shown.lists(&volume, &self.transfer);
+        let lists = shown.lists(&volume);
         self.lists.iter_mut().zip(lists).for_each(|(old, new)| old.replace(new));
         self.revision += 1;
         self.shown = Some(shown);
@@ -174,7 +174,7 @@ impl ClassifiedVolume {
         match needs {
             Some(needs) if self.shown.as_ref().is_none_or(|shown| shown.needs != *needs) => {
                 let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
-                let lists = shown.lists(self.volume(), &self.transfer);
+                let lists = shown.lists(self.volume());
                 lists.into_iter().map(|bricks| SettledBricks::of(limits, bricks)).collect()
             }
             _ => self.lists.iter().map(|list| list.settled(limits)).collect(),
@@ -323,8 +323,11 @@ impl ClassifiedVolume {
 
     /// Lets bricks enter and leave that must.
     fn look_at_bricks(&mut self) -> Touched {
-        let Some(shown) = &self.shown else { return Touched::default() };
-        let lists = shown.lists(self.volume(), &self.transfer);
+        let volume = Arc::clone(self.volume());
+        let values = opaque_values(&volume, &self.transfer);
+        let Some(shown) = self.shown.as_mut().filter(|shown| shown.values != values) else { return Touched::default() };
+        shown.values = values;
+        let lists = shown.lists(&volume);
         let changes: Vec<(Vec<u32>, Vec<u32>)> =
             self.lists.iter().zip(lists).map(|(old, new)| old.list().changes_to(&new)).collect();
         self.change_all(&changes)

@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
-use crate::after::brick_ranges::{Bearing, BrickRanges};
+use crate::after::brick_ranges::{Bearing, BrickRanges, values_of};
 use crate::after::shown_voxels::shown_voxels;
 use crate::geometry::plane_geometry::Reach;
 use crate::gpu::coefficients::Coefficients;
 use crate::lists::brick::BrickList;
 use crate::lists::classify::channels;
+use crate::lists::iso_range::ValueSet;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{ValueSlice, Volume};
 
@@ -16,8 +17,9 @@ use crate::volume::{ValueSlice, Volume};
 pub(super) struct ShownBricks {
     /// What they were found for.
     pub(super) needs: BrickNeeds,
-    /// For every channel that is drawn.
+    /// For every channel that is drawn, and the values that have an opacity in it.
     ranges: Vec<BrickRanges>,
+    pub(super) values: Vec<ValueSet>,
 }
 
 /// What decides, beside the transfer function, which bricks may be drawn.
@@ -43,22 +45,29 @@ impl PartialEq for BrickNeeds {
 
 impl ShownBricks {
     pub(super) fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
-        let ranges = |(number, (channel, _)): (usize, (&Volume, &TransferFunction))| {
-            BrickRanges::new(channel.grid(), needs.of_channel(number, channel), needs.reach.along)
-        };
-        let ranges = channels(volume, transfer).enumerate().map(ranges).collect();
-        Self { needs: needs.clone(), ranges }
+        let mut shown = Self { needs: needs.clone(), ranges: Vec::new(), values: opaque_values(volume, transfer) };
+        for (number, channel) in volume.channels().enumerate().take(shown.values.len()) {
+            let coefficients = needs.of_channel(number, channel);
+            shown.ranges.push(BrickRanges::new(channel.grid(), coefficients, needs.reach.along));
+        }
+        shown
     }
 
-    /// The voxels of each channel that may be drawn under a transfer function.
-    pub(super) fn lists(&self, volume: &Volume, transfer: &TransferFunction) -> Vec<BrickList> {
-        let Self { needs, ranges } = self;
-        let list = |(number, (channel, transfer)): (usize, (&Volume, &TransferFunction))| {
-            let coefficients = needs.of_channel(number, channel);
-            shown_voxels((&ranges[number], &needs.reach), (channel, coefficients), transfer, needs.bearing)
-        };
-        channels(volume, transfer).enumerate().map(list).collect()
+    /// The voxels of each channel that may be drawn.
+    pub(super) fn lists(&self, volume: &Volume) -> Vec<BrickList> {
+        let Self { needs, ranges, values } = self;
+        let mut lists = Vec::new();
+        for (number, channel) in volume.channels().enumerate().take(values.len()) {
+            let of = (channel, needs.of_channel(number, channel));
+            lists.push(shown_voxels((&ranges[number], &needs.reach), of, &values[number], needs.bearing));
+        }
+        lists
     }
+}
+
+/// The values that have an opacity in each channel that is drawn. While they stay the same, so do the voxels that may be drawn.
+pub(super) fn opaque_values(volume: &Volume, transfer: &TransferFunction) -> Vec<ValueSet> {
+    channels(volume, transfer).map(|(channel, transfer)| values_of(channel, transfer)).collect()
 }
 
 impl BrickNeeds {

@@ -64,8 +64,7 @@ impl BrickList {
                     flags.fill(false);
                     flag(y, z, &mut flags[..grid.dims.x as usize]);
                     for (mask, flags) in masks.iter_mut().zip(flags.chunks_exact(SIDE as usize)) {
-                        let bits = flags.iter().rev().fold(0, |bits, &flag| bits << 1 | u64::from(flag));
-                        *mask |= bits << slot;
+                        *mask |= packed(flags) << slot;
                     }
                 }
             }
@@ -174,6 +173,11 @@ impl BrickList {
         self.numbers[brick as usize] = self.bricks.len() as u32;
         self.bricks.push(Brick { present: [0; 2], x: at.x, y: at.y, z: at.z, extent: 0 });
     }
+}
+
+/// A mask of up to 64 flags, the first in its lowest bit.
+pub(crate) fn packed(flags: &[bool]) -> u64 {
+    flags.iter().rev().fold(0, |bits, &flag| bits << 1 | u64::from(flag))
 }
 
 /// A mask of a brick's occupied slots.

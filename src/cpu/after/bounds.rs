@@ -17,7 +17,7 @@ const DEPTH: usize = 16;
 const MOST_CUT: f64 = 0.05;
 
 /// What the kernels of a frame allow.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Bounds {
     /// The greatest share of the outer two of four voxels along an axis.
     outer: f32,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::UVec3;
+use glam::{DVec3, UVec3};
 
 use super::bounds::Bounds;
 use super::cells::{Cells, Work};
@@ -11,7 +11,7 @@ use super::differences::{Differences, MAX_VOXELS};
 use super::extreme::is_choice;
 use super::field::Field;
 use super::slab_integral::Integrals;
-use crate::after::brick_ranges::{Bearing, BrickRanges};
+use crate::after::brick_ranges::{Bearing, BrickRanges, values_of};
 use crate::after::coefficients;
 use crate::after::normalization::Normalization;
 use crate::after::shown_voxels::shown_voxels;
@@ -20,6 +20,7 @@ use crate::geometry::plane_geometry::{PlaneGeometry, Reach};
 use crate::geometry::view_geometry::ViewGeometry;
 
 use crate::lists::brick::{self, Brick, BrickList};
+use crate::lists::iso_range::ValueSet;
 use crate::scene::Scene;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Compositing, Interpolation};
@@ -74,12 +75,17 @@ struct Ranges {
 /// The choice of bricks.
 #[derive(Clone, Debug)]
 struct Shown {
+    /// The values with an opacity, and those that bear on the image beside them.
+    values: ValueSet,
+    bearing: Bearing,
+    /// How far the widest kernels reach, in whole voxels, and what their means are bounded by.
+    kernels: (DVec3, Option<Bounds>),
     /// The voxels that may affect a slab with an opacity.
     bricks: BrickList,
     /// The bricks of the grid in whose cells a ray may meet the near plane of a slab with an opacity.
     wanted: Vec<u32>,
-    /// `None` where values without an opacity count too.
-    cells: Option<Cells>,
+    /// The least and the greatest number with an opacity, and the cells that can meet one; `None` where values without an opacity count too.
+    cells: Option<([f32; 2], Cells)>,
 }
 
 impl Coefficients {
@@ -151,8 +157,7 @@ impl Coefficients {
     }
 
     /// Finds the bricks that may be drawn in a view, if that may have changed them. The values around bricks are examined only in a view with new
-    /// reaches; a changed transfer function tests the bricks' ranges, and makes a new list of bricks only if it shows others. `sharing` is the number of channels that
-    /// share sheets.
+    /// reaches; a changed transfer function makes a new list only if other values have an opacity. `sharing` is the number of channels that share sheets.
     pub(in crate::cpu) fn look(
         &mut self,
         (volume, transfer): (&Volume, &TransferFunction),
@@ -162,10 +167,14 @@ impl Coefficients {
     ) {
         let (geometry, grid) = (PlaneGeometry::new(view, volume.grid()), volume.grid());
         let reaches = (geometry.reach(view).sharing(sharing), geometry.reach_from_cells(view));
+        let half_box = geometry.widest_half_box(view);
+        let bounds = Bounds::of(half_box, self.kernel).filter(|_| volume.holes() == 0);
+        let kernels = (half_box.ceil(), bounds);
         let is_stale = std::mem::take(&mut self.is_stale);
         let kept = self.ranges.take().filter(|ranges| ranges.reaches == reaches);
-        if kept.is_some() && self.shown.is_some() && !is_stale {
-            self.ranges = kept;
+        let old = self.shown.take().filter(|_| kept.is_some());
+        if !is_stale && old.as_ref().is_some_and(|old| old.kernels == kernels) {
+            (self.ranges, self.shown) = (kept, old);
             return;
         }
         let ranges = kept.unwrap_or_else(|| {
@@ -173,28 +182,38 @@ impl Coefficients {
                 [reaches.0.along, reaches.1].map(|reach| BrickRanges::new(grid, self.all(volume), reach));
             Ranges { reaches, of_kernels, of_cells }
         });
-        let bearing = Bearing::of(compositing);
-        let of_kernels = (&ranges.of_kernels, &ranges.reaches.0);
-        let bricks = shown_voxels(of_kernels, (volume, self.all(volume)), transfer, bearing);
-        // A frame of the same bricks finds them where they were.
-        let bricks = self.shown.take().map(|old| old.bricks).filter(|old| *old == bricks).unwrap_or(bricks);
-        let is_wanted = match is_choice(compositing) {
-            // A value without an opacity may be chosen.
-            true => vec![true; brick::bricks_per_axis(grid).element_product() as usize],
-            false => ranges.of_cells.shown(volume, transfer, bearing),
+        let (values, bearing) = (values_of(volume, transfer), Bearing::of(compositing));
+        let (listed, old_cells) = match old {
+            Some(old) => {
+                let is_same = (&old.values, old.bearing) == (&values, bearing);
+                (is_same.then_some((old.bricks, old.wanted)), old.cells.filter(|_| old.kernels == kernels))
+            }
+            None => (None, None),
         };
-        let wanted = (0..is_wanted.len() as u32).filter(|&brick| is_wanted[brick as usize]).collect();
+        let (bricks, wanted) = listed.unwrap_or_else(|| {
+            let of_kernels = (&ranges.of_kernels, &ranges.reaches.0);
+            let is_wanted = match is_choice(compositing) {
+                // A value without an opacity may be chosen.
+                true => vec![true; brick::bricks_per_axis(grid).element_product() as usize],
+                false => ranges.of_cells.shown(&values, bearing),
+            };
+            let wanted = (0..is_wanted.len() as u32).filter(|&brick| is_wanted[brick as usize]).collect();
+            (shown_voxels(of_kernels, (volume, self.all(volume)), &values, bearing), wanted)
+        });
         let cells = (!is_choice(compositing)).then(|| {
             let shown = Integrals::new(volume.labels().is_some(), transfer, compositing, &self.numbers).shown;
-            let (all, half_box) = (self.all(volume), geometry.widest_half_box(view));
-            let cells = Cells::new(grid, all, &self.numbers, half_box, shown, Work::Shared);
-            match Bounds::of(half_box, self.kernel).filter(|_| volume.holes() == 0) {
-                Some(bounds) => cells.within(&bounds, (grid, all, &self.numbers), shown),
-                None => cells,
-            }
+            let all = self.all(volume);
+            old_cells.filter(|(of, _)| *of == shown).unwrap_or_else(|| {
+                let cells = Cells::new(grid, all, &self.numbers, half_box, shown, Work::Shared);
+                let cells = match &bounds {
+                    Some(bounds) => cells.within(bounds, (grid, all, &self.numbers), shown),
+                    None => cells,
+                };
+                (shown, cells)
+            })
         });
         self.ranges = Some(ranges);
-        self.shown = Some(Shown { bricks, wanted, cells });
+        self.shown = Some(Shown { values, bearing, kernels, bricks, wanted, cells });
     }
 
     /// For the last view that was looked at, the bricks whose voxels may affect a slab with an opacity.
@@ -218,6 +237,6 @@ impl Coefficients {
 
     /// Where values can meet an opacity; `None` where all values count.
     pub(super) fn cells(&self) -> Option<&Cells> {
-        self.shown.as_ref().and_then(|shown| shown.cells.as_ref())
+        self.shown.as_ref().and_then(|shown| shown.cells.as_ref()).map(|(_, cells)| cells)
     }
 }
