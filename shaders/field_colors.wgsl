@@ -9,9 +9,6 @@
 // The colours of voxels; if `EXACT` the bits of the coefficients that interpolate them.
 @group(0) @binding(7) var colors: texture_2d_array<u32>;
 
-// Whether coefficients differ from the colours.
-override EXACT: bool = false;
-
 struct Quad {
     @builtin(position) position: vec4f,
     @location(0) @interpolate(flat) center_px: vec2f,
@@ -25,16 +22,6 @@ struct Quad {
     @location(4) @interpolate(flat) kernel: vec2f,
 }
 
-// A voxel's colour and A, or their coefficients.
-fn color_of(voxel: vec3u) -> vec4f {
-    let index = index_of(voxel);
-    if EXACT {
-        let texel = texel_of(index, textureDimensions(colors).x);
-        return bitcast<vec4f>(textureLoad(colors, texel.xy, texel.z, 0));
-    }
-    return stored_color(planes.colors, index);
-}
-
 @vertex
 fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance: u32) -> Quad {
     start(vertex >> 31u);
@@ -42,7 +29,7 @@ fn vertex(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance:
     let quad = instance * QUADS + vertex / 4u;
     let id = instances[min(quad, args.count - 1u)];
     let lies = quad_on_plane(voxels[id], vertex, quad < args.count);
-    let color = color_of(voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS));
+    let color = splatted_color(planes.colors, index_of(voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS)));
     return Quad(lies.position, lies.center_px, lies.rows, lies.distance, color, plane_kernel());
 }
 

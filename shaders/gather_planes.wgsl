@@ -146,7 +146,8 @@ fn shade_voxels(first: u32) {
         if is_in {
             queue_amounts[slot] = select(vec4f(0.0, 0.0, 0.0, NO_NUMBER), vec4f(gradient, number), is_there);
             if has_own_colors() {
-                queue_colors[slot] = stored_color(planes.colors, index_of(at));
+                // The coefficients of a hole's colour are NaN.
+                queue_colors[slot] = select(vec4f(0.0), splatted_color(planes.colors, index_of(at)), is_there);
             }
             let p = placed(at);
             if is_there {

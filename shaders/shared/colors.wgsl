@@ -4,8 +4,13 @@
 // The number that stands for 1 in them; 0 if voxels have none of their own.
 override FULL_COLOR: u32 = 0u;
 
-// The colour and A of a voxel, given by its index, in one of these channels, counted from 1.
-fn stored_color(place: u32, index: u32) -> vec4f {
+// What is stored for a voxel, given by its index, in one of these channels, counted from 1.
+fn stored_texel(place: u32, index: u32) -> vec4u {
     let texel = texel_of((place - 1u) * voxel_count() + index, textureDimensions(colors).x);
-    return vec4f(textureLoad(colors, texel.xy, texel.z, 0)) / f32(FULL_COLOR);
+    return textureLoad(colors, texel.xy, texel.z, 0);
+}
+
+// The colour and A of such a voxel.
+fn stored_color(place: u32, index: u32) -> vec4f {
+    return vec4f(stored_texel(place, index)) / f32(FULL_COLOR);
 }

@@ -8,32 +8,38 @@ use crate::after::coefficients;
 use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::gpu::fault::scoped;
+use crate::gpu::gpu_volume::one_after_the_other;
 use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
 use crate::parallel::prelude::*;
 use crate::volume::Volume;
 
-/// Coefficients that interpolate the values of one channel, and the colours of its voxels if they have their own: [`coefficients::of_volume`].
+/// Coefficients that interpolate the values of a volume's channels, and the colours of voxels that have their own: [`coefficients::of_volume`].
 #[derive(Debug)]
 pub(crate) struct Coefficients {
-    /// As values; NaN at holes.
-    pub(crate) values: Arc<[f32]>,
-    /// What they are splatted as.
-    pub(crate) numbers: Normalization,
-    colors: Option<Arc<[[f32; 4]]>>,
+    /// For each channel, as values; NaN at holes.
+    pub(crate) values: Vec<Arc<[f32]>>,
+    /// What each channel's are splatted as.
+    pub(crate) numbers: Vec<Normalization>,
+    /// For each channel whose voxels have colours of their own.
+    colors: Vec<Arc<[[f32; 4]]>>,
     /// Uploaded with the first frame.
     texture: OnceLock<VolumeTexture>,
     color_texture: OnceLock<VolumeTexture>,
 }
 
 impl Coefficients {
-    /// Those of a channel for a kernel's radius and falloff.
+    /// Those of a volume for a kernel's radius and falloff.
     ///
     /// # Errors
     /// If no coefficients interpolate the values: those of [`coefficients::exact`].
-    pub(super) fn of_channel(channel: &Volume, kernel: (f64, f64)) -> Result<Self, RenderError> {
-        let values = coefficients::of_volume(channel, kernel)?;
-        let numbers = Normalization::of(values.iter().copied()).unwrap_or(Normalization::new([0.0; 2]));
-        let colors = coefficients::of_colors(channel, kernel)?;
+    pub(super) fn of_volume(volume: &Volume, kernel: (f64, f64)) -> Result<Self, RenderError> {
+        let (mut values, mut numbers, mut colors) = (Vec::new(), Vec::new(), Vec::new());
+        for channel in volume.channels() {
+            let exact = coefficients::of_volume(channel, kernel)?;
+            numbers.push(Normalization::of(exact.iter().copied()).unwrap_or(Normalization::new([0.0; 2])));
+            values.push(exact);
+            colors.extend(coefficients::of_colors(channel, kernel)?);
+        }
         Ok(Self { values, numbers, colors, texture: OnceLock::new(), color_texture: OnceLock::new() })
     }
 
@@ -42,9 +48,10 @@ impl Coefficients {
     /// # Errors
     /// If they need more layers than textures may have.
     pub(crate) fn estimate(&self, limits: &Limits) -> Result<u64, RenderError> {
-        let voxels = self.values.len() as u64;
-        let [numbers, _] = VolumeTexture::estimate(limits, voxels, ValueFormat::Bits)?;
-        let colors = self.colors.as_ref().map_or(Ok(0), |_| VolumeTexture::estimate_color_bits(limits, voxels))?;
+        let voxels: usize = self.values.iter().map(|values| values.len()).sum();
+        let colored: usize = self.colors.iter().map(|colors| colors.len()).sum();
+        let [numbers, _] = VolumeTexture::estimate(limits, voxels as u64, ValueFormat::Bits)?;
+        let colors = if colored > 0 { VolumeTexture::estimate_color_bits(limits, colored as u64)? } else { 0 };
         Ok(numbers + colors)
     }
 
@@ -57,25 +64,27 @@ impl Coefficients {
             .sum()
     }
 
-    /// The bits of the numbers on the GPU, `R32Uint`.
+    /// The bits of the numbers of all channels on the GPU, one channel after the other, `R32Uint`.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have, or the device fails.
     pub(crate) fn texture(&self, device: &Device, queue: &Queue) -> Result<&TextureView, RenderError> {
         kept(&self.texture, || {
-            let numbers = self.numbers;
-            let numbers: Vec<f32> = self.values.par_iter().map(|&c| numbers.apply(f64::from(c)) as f32).collect();
-            scoped(device, || VolumeTexture::upload_bits(device, queue, &numbers))?
+            let mut all: Vec<f32> = Vec::new();
+            for (values, numbers) in self.values.iter().zip(&self.numbers) {
+                all.par_extend(values.par_iter().map(|&c| numbers.apply(f64::from(c)) as f32));
+            }
+            scoped(device, || VolumeTexture::upload_bits(device, queue, &all))?
         })
     }
 
-    /// The bits of the colours' coefficients, `Rgba32Uint`; `None` if voxels have no colours of their own.
+    /// The bits of the colours' coefficients, one channel with colours after the other, `Rgba32Uint`; `None` if no voxels have colours of their own.
     ///
     /// # Errors
     /// As for [`Self::texture`].
     pub(crate) fn color_texture(&self, device: &Device, queue: &Queue) -> Result<Option<&TextureView>, RenderError> {
-        let Some(colors) = &self.colors else { return Ok(None) };
-        let upload = || scoped(device, || VolumeTexture::upload_color_bits(device, queue, colors))?;
+        let Some(colors) = one_after_the_other(self.colors.iter().map(|colors| &**colors)) else { return Ok(None) };
+        let upload = || scoped(device, || VolumeTexture::upload_color_bits(device, queue, &colors))?;
         kept(&self.color_texture, upload).map(Some)
     }
 }

@@ -34,15 +34,11 @@ struct Shared {
     /// Of each channel's values.
     numbers: OnceLock<Vec<Normalization>>,
     /// Those of the kernel that was last asked for.
-    coefficients: Mutex<Option<ChannelCoefficients>>,
+    coefficients: Mutex<Option<KeptCoefficients>>,
 }
 
-/// The coefficients of each channel for a kernel's radius and falloff.
-#[derive(Debug)]
-struct ChannelCoefficients {
-    kernel: (f64, f64),
-    channels: Vec<Arc<Coefficients>>,
-}
+/// The coefficients for a kernel's radius and falloff.
+type KeptCoefficients = ((f64, f64), Arc<Coefficients>);
 
 impl GpuVolume {
     /// Uploads a volume's values: for each channel 4 bytes per voxel, or 1 or 2 if they are whole numbers in a range of 256 or 65536, and for a channel of
@@ -121,10 +117,7 @@ impl GpuVolume {
     pub fn gpu_bytes(&self) -> u64 {
         let colors = self.shared.colors.as_ref().map(|(texture, _)| texture);
         let textures = [Some(&self.shared.values), colors, self.shared.labels.get()];
-        let coefficients: u64 = match &*self.kept_coefficients() {
-            Some(kept) => kept.channels.iter().map(|channel| channel.gpu_bytes()).sum(),
-            None => 0,
-        };
+        let coefficients = self.kept_coefficients().as_ref().map_or(0, |(_, kept)| kept.gpu_bytes());
         textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients
     }
 
@@ -173,22 +166,21 @@ impl GpuVolume {
         self.shared.numbers.get_or_init(|| self.shared.volume.channels().map(of_channel).collect())
     }
 
-    fn kept_coefficients(&self) -> MutexGuard<'_, Option<ChannelCoefficients>> {
+    fn kept_coefficients(&self) -> MutexGuard<'_, Option<KeptCoefficients>> {
         self.shared.coefficients.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Each channel's coefficients for a kernel's radius and falloff, computed at the first request. Those of the previous kernel are dropped.
+    /// The coefficients of all channels for a kernel's radius and falloff, computed at the first request. Those of the previous kernel are dropped.
     ///
     /// # Errors
     /// If no coefficients interpolate the values.
-    pub(crate) fn coefficients(&self, kernel: (f64, f64)) -> Result<Vec<Arc<Coefficients>>, RenderError> {
-        if let Some(kept) = self.kept_coefficients().as_ref().filter(|kept| kept.kernel == kernel) {
-            return Ok(kept.channels.clone());
+    pub(crate) fn coefficients(&self, kernel: (f64, f64)) -> Result<Arc<Coefficients>, RenderError> {
+        if let Some((_, kept)) = self.kept_coefficients().as_ref().filter(|(of, _)| *of == kernel) {
+            return Ok(Arc::clone(kept));
         }
-        let of_channel = |channel: &Volume| Coefficients::of_channel(channel, kernel).map(Arc::new);
-        let channels = self.shared.volume.channels().map(of_channel).collect::<Result<Vec<_>, _>>()?;
-        *self.kept_coefficients() = Some(ChannelCoefficients { kernel, channels: channels.clone() });
-        Ok(channels)
+        let coefficients = Arc::new(Coefficients::of_volume(&self.shared.volume, kernel)?);
+        *self.kept_coefficients() = Some((kernel, Arc::clone(&coefficients)));
+        Ok(coefficients)
     }
 
     /// Uploads the labels, if there are any and they are not uploaded yet.
@@ -244,7 +236,7 @@ fn all_labels(volume: &Volume) -> Option<Cow<'_, [u16]>> {
 }
 
 /// The numbers of all channels that have any; `None` if no channel has.
-fn one_after_the_other<'a, T: Copy>(mut channels: impl Iterator<Item = &'a [T]>) -> Option<Cow<'a, [T]>> {
+pub(super) fn one_after_the_other<'a, T: Copy>(mut channels: impl Iterator<Item = &'a [T]>) -> Option<Cow<'a, [T]>> {
     let mut all = Cow::Borrowed(channels.next()?);
     channels.for_each(|channel| all.to_mut().extend_from_slice(channel));
     Some(all)

@@ -171,6 +171,7 @@ pub const VALUES: Shader = shader!(
     "shared/project",
     "shared/field_voxel",
     "shared/planes",
+    "shared/exact",
     "shared/number"
 );
 /// Draws them onto a slab plane.
@@ -191,6 +192,8 @@ pub const FIELD_COLORS: Shader = shader!(
     "shared/brick",
     "shared/texels",
     "shared/colors",
+    "shared/exact",
+    "shared/splatted_color",
     "shared/field_voxel",
     "shared/planes",
     "shared/sheets",
@@ -276,6 +279,8 @@ pub const GATHER_PLANES: Shader = shader!(
     "shared/volume",
     "shared/channels",
     "shared/colors",
+    "shared/exact",
+    "shared/splatted_color",
     "shared/project",
     "shared/shading",
     "shared/ramps",

@@ -27,8 +27,8 @@ pub(super) struct ShownBricks {
 pub(crate) struct BrickNeeds {
     /// How far from a voxel others bear on what it shows.
     pub(crate) reach: Reach,
-    /// Those of each channel, where they are not the values.
-    pub(crate) coefficients: Option<Vec<Arc<Coefficients>>>,
+    /// What is splatted, where it is not the values.
+    pub(crate) coefficients: Option<Arc<Coefficients>>,
     /// Which values bear on the image.
     pub(crate) bearing: Bearing,
 }
@@ -36,7 +36,7 @@ pub(crate) struct BrickNeeds {
 impl PartialEq for BrickNeeds {
     fn eq(&self, other: &Self) -> bool {
         let same = match (&self.coefficients, &other.coefficients) {
-            (Some(own), Some(others)) => own.iter().zip(others).all(|(own, other)| Arc::ptr_eq(own, other)),
+            (Some(own), Some(other)) => Arc::ptr_eq(own, other),
             (own, others) => own.is_none() && others.is_none(),
         };
         (self.reach, self.bearing) == (other.reach, other.bearing) && same
@@ -73,7 +73,7 @@ pub(super) fn opaque_values(volume: &Volume, transfer: &TransferFunction) -> Vec
 impl BrickNeeds {
     /// The coefficients of a channel.
     fn of_channel<'a>(&'a self, number: usize, channel: &'a Volume) -> ValueSlice<'a> {
-        let exact = self.coefficients.as_ref().map(|all| ValueSlice::from(&*all[number].values));
+        let exact = self.coefficients.as_ref().map(|all| ValueSlice::from(&*all.values[number]));
         exact.unwrap_or(channel.values())
     }
 }

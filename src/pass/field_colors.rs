@@ -29,14 +29,11 @@ pub struct FieldColors {
 
 /// What the colours of voxels are read from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ColorMode {
-    /// The volume's colours, in which this number stands for 1.
-    Smooth {
-        /// The number.
-        full: u32,
-    },
-    /// The bits of coefficients.
-    Exact,
+pub struct ColorMode {
+    /// The number in the volume's colours that stands for 1.
+    pub full: u32,
+    /// Whether they are the bits of coefficients.
+    pub is_exact: bool,
 }
 
 /// The buffers of one list.
@@ -87,10 +84,7 @@ impl FieldColors {
     fn pipeline(&self, device: &Device, mode: ColorMode) -> Arc<RenderPipeline> {
         let compile = || {
             let sheets = sheets_of_a_group(self.format, 1, Some(added_to(wgpu::BlendFactor::One)));
-            let (full, is_exact) = match mode {
-                ColorMode::Smooth { full } => (full, false),
-                ColorMode::Exact => (1, true),
-            };
+            let ColorMode { full, is_exact } = mode;
             let constants = [("FULL_COLOR", f64::from(full)), ("EXACT", f64::from(u8::from(is_exact)))];
             let entries = (shaders::FIELD_COLORS, ["vertex", "fragment"]);
             Arc::new(render_pipeline(device, entries, &self.bindings.pipeline_layout, &sheets, &constants))

@@ -118,7 +118,7 @@ impl FieldRasterizer {
         let group_bytes = |plan: &FramePlan, stride| uniforms::plane_groups(plan, &after.planes, splatting, stride);
         let (groups, bucketed) = SheetGroups::prepare(inputs, settings, &self.tiles, group_bytes, old_groups)?;
         let channels = Self::prepare_channels(inputs, after, &groups, old_channels)?;
-        let lists = self.prepare_lists(inputs, after, (&groups, &channels), old_lists)?;
+        let lists = self.prepare_lists(inputs, (&groups, &channels), old_lists)?;
         let carried = Carried::prepare(inputs, after.numbers[0], 0, old_carried)?;
         self.field.prepare(device, after.gradient);
         let SheetGroups { targets, tile_lists, .. } = &groups;
@@ -167,30 +167,26 @@ impl FieldRasterizer {
     fn prepare_lists(
         &self,
         inputs: FrameInputs<'_>,
-        after: &After,
         (groups, channels): (&SheetGroups, &[PreparedChannel]),
         old: Vec<PreparedList>,
     ) -> Result<Vec<PreparedList>, RenderError> {
-        let FrameInputs { device, queue, request, frame, .. } = inputs;
+        let FrameInputs { device, frame, .. } = inputs;
         let mut old = old.into_iter().map(|old| old.cull);
         let mut planned = groups.planned.orders.iter().zip(&groups.planned.most);
         let mut prepared = Vec::new();
+        let (coefficients, colors) = (inputs.coefficients()?, inputs.splatted_colors()?);
         for (channel, (of, bricks)) in channels.iter().zip(inputs.lists()).enumerate() {
-            let exact = after.needs.coefficients.as_ref().map(|all| &all[request.layer.channels.start + channel]);
-            let coefficients = exact.map(|exact| exact.texture(device, queue)).transpose()?;
-            let colors = match (exact, inputs.colors().filter(|_| of.colors.is_some())) {
-                (Some(exact), Some(_)) => exact.color_texture(device, queue)?.map(|view| (ColorMode::Exact, view)),
-                (None, Some(own)) => Some((ColorMode::Smooth { full: own.full }, own.view)),
-                (_, None) => None,
-            };
+            let colors = colors.filter(|_| of.colors.is_some());
             let planes = &of.planes;
             let buffers = groups.cull_buffers(inputs, Some(PlaneBuffers { planes, coefficients }));
             for (list, (order, &most)) in bricks.lists.iter().zip(&mut planned) {
                 let cull = self.cull.prepare(device, buffers, list, order, most, old.next())?;
                 let field_group = self.field.bind(device, [frame, &groups.groups, planes], &cull);
-                let color_group = colors.map(|(mode, colors)| {
+                let color_group = colors.map(|colors| {
                     let stage = self.colors.get_or_init(|| FieldColors::new(device, self.sheet_format));
                     let (groups, bricks) = (&groups.groups, &list.buffer);
+                    let mode = ColorMode { full: colors.full, is_exact: coefficients.is_some() };
+                    let colors = colors.view;
                     stage.bind(device, mode, FieldColorsBuffers { frame, groups, planes, bricks, colors }, &cull)
                 });
                 prepared.push(PreparedList { channel, cull, field_group, color_group });

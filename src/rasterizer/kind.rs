@@ -5,12 +5,9 @@ use wgpu::Device;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::gpu::device::TILE_FEATURES;
-use crate::gpu::ramps::Stored;
 use crate::pass::composite::RayMode;
 use crate::pass::gather::{MOST_LAYERS, WORKGROUP_BYTES};
-use crate::settings::splatting::{
-    Classification, FootprintBox, FootprintForm, Interpolation, Method, Rasterizer, Splatting,
-};
+use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
 /// The subgroup sizes that tiles support.
 const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=64;
@@ -30,7 +27,7 @@ pub(crate) enum RasterizerKind {
 }
 
 impl RasterizerKind {
-    /// The rasterizer for some settings and the channels that share sheets; if it is quads only because of the device, also the reason. `preferred` is the
+    /// The rasterizer for some settings and the number of channels that share sheets; if it is quads only because of the device, also the reason. `preferred` is the
     /// renderer's choice, for settings that do not name one.
     ///
     /// # Errors
@@ -38,7 +35,7 @@ impl RasterizerKind {
     pub(crate) fn of(
         device: &Device,
         splatting: &Splatting,
-        channels: &[Stored],
+        channels: usize,
         preferred: Rasterizer,
     ) -> Result<(Self, Option<RenderError>), RenderError> {
         let needs_tiles =
@@ -72,17 +69,12 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
     Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
-/// Why tiles do not support some settings, or channels with them; `None` if they do.
-fn obstacle_in_settings(splatting: &Splatting, channels: &[Stored]) -> Option<RenderError> {
+/// Why tiles do not support some settings, or so many channels with them; `None` if they do.
+fn obstacle_in_settings(splatting: &Splatting, channels: usize) -> Option<RenderError> {
     let is_after = splatting.classification == Classification::After;
-    if is_after && channels.len() > MOST_LAYERS {
-        let found = format!("splatting.classification = \"after\" and {} channels", channels.len());
+    if is_after && channels > MOST_LAYERS {
+        let found = format!("splatting.classification = \"after\" and {channels} channels");
         return refused_tiles(found, &format!("at most {MOST_LAYERS}, \"before\" with them, or \"quads\""));
-    }
-    let has_colors = channels.iter().any(|channel| channel.colors > 0);
-    if is_after && splatting.interpolation == Interpolation::Exact && (channels.len() > 1 || has_colors) {
-        let found = "splatting.interpolation = \"exact\" and several channels, or a volume of colours".to_owned();
-        return refused_tiles(found, "\"smooth\" with them, or \"quads\"");
     }
     if splatting.method == Method::CompositeEverySample {
         let found = "splatting.method = \"composite-every-sample\"".to_owned();

@@ -85,6 +85,31 @@ impl<'a> FrameInputs<'a> {
         self.volume.colors(&self.request.layer)
     }
 
+    /// The coefficients of all channels, where they are not the values.
+    ///
+    /// # Errors
+    /// Those of [`Coefficients::texture`](crate::gpu::coefficients::Coefficients::texture).
+    fn coefficients(&self) -> Result<Option<&'a TextureView>, RenderError> {
+        let Some(after) = &self.request.after else { return Ok(None) };
+        let exact = after.needs.coefficients.as_ref();
+        exact.map(|exact| exact.texture(self.device, self.queue)).transpose()
+    }
+
+    /// What is splatted for these colours: themselves or their coefficients.
+    ///
+    /// # Errors
+    /// As for [`Self::coefficients`].
+    fn splatted_colors(&self) -> Result<Option<OwnColors<'a>>, RenderError> {
+        let smooth = self.colors();
+        match self.request.after.as_ref().and_then(|after| after.needs.coefficients.as_ref()) {
+            Some(exact) if smooth.is_some() => {
+                let view = exact.color_texture(self.device, self.queue)?;
+                Ok(view.map(|view| OwnColors { view, full: 1 }))
+            }
+            _ => Ok(smooth),
+        }
+    }
+
     /// The labels, if shading needs them.
     fn labels(&self) -> Option<&'a TextureView> {
         self.volume.labels(&self.request.layer)

@@ -85,9 +85,7 @@ impl After {
             Interpolation::Smooth => None,
             Interpolation::Exact => Some(volume.gpu_volume().coefficients((splatting.radius, splatting.falloff))?),
         };
-        let of_values = || volume.gpu_volume().numbers().to_vec();
-        let numbers =
-            coefficients.as_ref().map_or_else(of_values, |exact| exact.iter().map(|exact| exact.numbers).collect());
+        let numbers = coefficients.as_ref().map_or_else(|| volume.gpu_volume().numbers(), |exact| &exact.numbers);
         let numbers = numbers[layer.channels.clone()].to_vec();
         let mut view = *seen;
         if let Some(perspective) = &mut view.perspective {
@@ -133,7 +131,7 @@ impl FrameRequest {
         let rays = RayMode { first_hit: first_hit.is_some(), ..rays };
         check_hits(device, rays, size)?;
         let surfaces = hiding.map(|hiding| hiding.depths(&seen, grid)).transpose()?;
-        let (kind, fallback) = RasterizerKind::of(device, &splatting, &stored, rasterizer)?;
+        let (kind, fallback) = RasterizerKind::of(device, &splatting, stored.len(), rasterizer)?;
         let after = is_after.then(|| After::new((volume, layer), scene, &seen)).transpose()?;
         let integration = after.as_ref().map(|after| Integration {
             compositing: splatting.compositing,

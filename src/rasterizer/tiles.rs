@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use bytemuck::Zeroable;
-use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits, TextureView};
+use wgpu::{Buffer, BufferUsages, CommandEncoder, Limits};
 
 use super::carried::Carried;
 use super::patch_ranges::{Dispatch, patch_ranges, range_stride};
@@ -76,7 +76,7 @@ impl TileRasterizer {
         inputs: FrameInputs<'_>,
         previous: Option<TileFrame>,
     ) -> Result<(TileFrame, Prepared), RenderError> {
-        let FrameInputs { device, queue, request, .. } = inputs;
+        let FrameInputs { device, request, .. } = inputs;
         let limits = device.limits();
         let (old_binned, old_buffers, old_carried) = match previous {
             Some(old) => (Some(old.binned), Some(old.buffers), old.carried),
@@ -91,15 +91,11 @@ impl TileRasterizer {
         let (range_bytes, dispatches) = patch_ranges(&limits, request);
         let contents = (&binned.bins, &results, &range_bytes[..]);
         let buffers = TileBuffers::filled(inputs, spec, contents, bricks, (old_buffers, is_new))?;
-        let coefficients = match request.after.as_ref().and_then(|after| after.needs.coefficients.as_ref()) {
-            Some(exact) => Some(exact[request.layer.channels.start].texture(device, queue)?),
-            None => None,
-        };
         let carried = match &request.after {
             Some(after) => Some(Carried::prepare(inputs, after.numbers[0], request.sheet_records(), old_carried)?),
             None => None,
         };
-        let bands = self.bind(inputs, &binned.bins, (&buffers, carried.as_ref()), coefficients);
+        let bands = self.bind(inputs, &binned.bins, (&buffers, carried.as_ref()))?;
         let frame = TileFrame { binned, buffers, results, dispatches, bands, carried };
         Ok((frame, Prepared { bucketed: is_new, tabled: false }))
     }
@@ -110,14 +106,14 @@ impl TileRasterizer {
         inputs: FrameInputs<'_>,
         bins: &PatchBins,
         (own, carried): (&TileBuffers<Buffer>, Option<&Carried>),
-        coefficients: Option<&TextureView>,
-    ) -> Vec<GatherBand> {
+    ) -> Result<Vec<GatherBand>, RenderError> {
         let FrameInputs { device, volume, request, .. } = inputs;
         let FrameRequest { splatting, view, rays, .. } = request;
         let of_volume = [inputs.labels().is_some(), volume.has_holes()];
+        let (coefficients, colors) = (inputs.coefficients()?, inputs.splatted_colors()?);
         let planes = plane_mode(request);
         let mode = GatherMode::of(splatting, planes, view.perspective.is_some(), of_volume, *rays, bins.workgroups)
-            .with_channels(request.ramps.channels, inputs.colors());
+            .with_channels(request.ramps.channels, colors);
         let buffers = GatherBuffers {
             frame: inputs.frame,
             gather: &own.uniform,
@@ -127,7 +123,7 @@ impl TileRasterizer {
             bins: &own.bins,
             control_points: inputs.control_points,
             values: volume.values(),
-            colors: inputs.colors(),
+            colors,
             labels: inputs.labels(),
             gathered: &own.gathered,
             half_boxes: &own.half_boxes,
@@ -137,7 +133,7 @@ impl TileRasterizer {
         let bind = |(at, band): (usize, &BandBuffer)| {
             self.gather.bind(device, mode, buffers, (&band.acc, carried(at)), bins.dispatches)
         };
-        inputs.compositing.bands.iter().enumerate().map(bind).collect()
+        Ok(inputs.compositing.bands.iter().enumerate().map(bind).collect())
     }
 
     /// The resources that a new frame of these layers' bricks, in `lists` lists, needs.

@@ -166,10 +166,7 @@ impl Renderer {
         let timer = if self.profile { Timer::estimate(&self.device, passes) } else { None };
         buffers.push(staging(timestamps_at(count_bytes), timer.is_some(), passes));
         let coefficients = match needs.and_then(|needs| needs.coefficients.as_ref()) {
-            Some(exact) => {
-                let drawn = requests.last().map_or(0, |last| last.layer.channels.end);
-                exact.iter().take(drawn).map(|exact| exact.estimate(&limits)).sum::<Result<u64, RenderError>>()?
-            }
+            Some(exact) => exact.estimate(&limits)?,
             None => 0,
         };
         let lists: u64 = settled.iter().map(SettledBricks::gpu_bytes).sum();

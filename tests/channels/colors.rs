@@ -71,10 +71,6 @@ fn assert_is_the_twins(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) {
     let expected = draw(Backend::Reference, volume, scene);
     assert!(expected.image.pixels.iter().filter(|pixel| pixel[3] > 0.05).count() > 100, "{compositing:?}");
     for rasterizer in RASTERIZERS {
-        // Colours have coefficients of their own.
-        if (interpolation, rasterizer) == (Interpolation::Exact, Rasterizer::Tiles) {
-            continue;
-        }
         let splatting = Splatting { rasterizer, ..scene.splatting };
         let actual = gpu.render_volume(volume.clone(), &Scene { splatting, ..scene.clone() }).unwrap();
         let what = format!("{classification:?} {compositing:?} {interpolation:?} by {rasterizer:?}");
@@ -106,11 +102,6 @@ fn the_gpu_draws_what_the_twin_draws() {
             assert_is_the_twins(gpu, &volume, &scene);
         }
     }
-    let (volume, mut scene) = colored(&mut random, DVec3::ONE);
-    (scene.splatting.classification, scene.splatting.rasterizer) = (Classification::After, Rasterizer::Tiles);
-    scene.splatting.interpolation = Interpolation::Exact;
-    let message = gpu.render_volume(volume, &scene).unwrap_err().to_string();
-    assert!(message.contains("found \"tiles\" with splatting.interpolation = \"exact\" and several"), "{message}");
 }
 
 /// Colours in the second and fourth of four channels.

@@ -6,7 +6,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::headless::{Backend, GpuHeadless};
 use sheetsplat::scene::TransferSettings;
 use sheetsplat::settings::{
-    Classification, Compositing, Interpolation, LabelTables, Order, Ramp, Rasterizer, Splatting,
+    Classification, Compositing, Gradient, Interpolation, LabelTables, Order, Ramp, Rasterizer, Splatting,
 };
 use sheetsplat::volume::{Labels, Volume};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
@@ -32,9 +32,7 @@ fn rasterizers(volume: &Volume, splatting: &Splatting) -> &'static [Rasterizer] 
     // To find a surface among the cells of labels' tables may take more loops than a driver allows in one dispatch.
     let is_labelled = volume.channels().any(|channel| channel.labels().is_some());
     let is_long = is_after && is_labelled && splatting.compositing == Compositing::Surface;
-    // Each channel has coefficients of its own.
-    let is_exact = splatting.interpolation == Interpolation::Exact;
-    if is_exact || is_long { &[Rasterizer::Quads] } else { &RASTERIZERS }
+    if is_long { &[Rasterizer::Quads] } else { &RASTERIZERS }
 }
 
 /// Compares an image with the twin's.
@@ -130,8 +128,11 @@ fn channels_of_different_bricks_are_each_drawn_whole() {
 fn exact_fields_are_those_of_the_twin() {
     let gpu = gpu();
     let mut random = Random(122);
-    for compositing in [Compositing::Exponential, Compositing::Maximum] {
+    for (round, compositing) in COMPOSITINGS.into_iter().enumerate() {
         let (volume, mut scene) = random_case(&mut random, 3);
+        if round % 2 == 0 {
+            scene.shading.gradient = Gradient::Kernel;
+        }
         scene.splatting.classification = Classification::After;
         (scene.splatting.compositing, scene.splatting.interpolation) = (compositing, Interpolation::Exact);
         assert_is_the_twins(gpu, &volume, &scene, "exact");
@@ -384,26 +385,6 @@ fn picks_are_those_of_the_native_backend() {
             assert!(channels[0] + channels[1] > 10, "{what}: {channels:?}");
         }
     }
-}
-
-#[test]
-fn tiles_that_do_not_draw_channels_leave_them_to_quads() {
-    let gpu = gpu();
-    let mut random = Random(2);
-    let (volume, mut scene) = random_case(&mut random, 2);
-    scene.splatting.classification = Classification::After;
-    assert_eq!(gpu.render_volume(volume.clone(), &scene).unwrap().stats.rasterizer, "tiles");
-    scene.splatting.interpolation = Interpolation::Exact;
-    let auto = gpu.render_volume(volume.clone(), &scene).unwrap();
-    assert_eq!(auto.stats.rasterizer, "quads");
-    assert_eq!(auto.image, gpu.render_volume(volume.clone(), &by(Rasterizer::Quads, &scene)).unwrap().image);
-    let error = gpu.render_volume(volume, &by(Rasterizer::Tiles, &scene)).unwrap_err().to_string();
-    assert!(
-        error.starts_with(
-            "splatting.rasterizer: found \"tiles\" with splatting.interpolation = \"exact\" and several channels"
-        ),
-        "{error}"
-    );
 }
 
 /// Four channels of waves, and a scene that shows all of them.

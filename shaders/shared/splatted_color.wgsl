@@ -1,0 +1,10 @@
+// What is splatted for voxels with colours of their own (SPEC §§9, 10). A stage that includes this includes `exact` and `colors`; if `EXACT`, the
+// texture array has the bits of coefficients.
+
+// The colour and A of a voxel, given by its index, or their coefficients.
+fn splatted_color(place: u32, index: u32) -> vec4f {
+    if EXACT {
+        return bitcast<vec4f>(stored_texel(place, index));
+    }
+    return stored_color(place, index);
+}
