@@ -316,7 +316,7 @@ fn may_show(slab: Slab, part: vec2f, image: vec4f) -> bool {
     }
     let is_seen = part.x < part.y && is_drawn(slab.near + 0.5 * frame.slab_width);
     // Labels' tables differ from cell to cell.
-    let is_among = has_opacity(slab, table_at(slab.at, 0.5 * (part.x + part.y))) || (LABELS && COMPOSITING == SURFACE);
+    let is_among = has_opacity(slab, table_at(slab.at, 0.5 * (part.x + part.y), 0.0)) || (LABELS && COMPOSITING == SURFACE);
     return is_open(image) && is_seen && is_among;
 }
 

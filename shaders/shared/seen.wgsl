@@ -45,12 +45,12 @@ fn colored(given: vec3f, own: vec4f) -> vec4f {
     return select(vec4f(given, 1.0), own, has_own_colors());
 }
 
-// The transfer function of the voxel whose cell holds the point of a pixel's ray at a sheet depth.
-fn table_at(at: vec3f, sheet_depth: f32) -> Table {
+// The transfer function of the voxel whose cell holds the point of a pixel's ray at a sheet depth, moved by `hair` voxels along each axis.
+fn table_at(at: vec3f, sheet_depth: f32, hair: f32) -> Table {
     if !LABELS {
         return seen_table;
     }
-    return table_of(ramps_of(seen_channel.number, index_of(nearest_voxel(voxel_at(at, sheet_depth)))));
+    return table_of(ramps_of(seen_channel.number, index_of(nearest_voxel(voxel_at(at, sheet_depth) + hair))));
 }
 
 // The amount per unit length (without a logarithm: the opacity) and the colour.

@@ -17,6 +17,9 @@ const NO_SAMPLE = vec4f(NO_NUMBER, 0.0, 0.0, 0.0);
 // Numbers that differ by less, relative to the range of all numbers, count as equal: in homogeneous matter only rounding tells them apart.
 const HAIR_OF_RANGE = 2e-6;
 
+// By how much of a cell the middles of rays are moved before their voxel is found: where cells meet, rounding would decide pixel by pixel.
+const HAIR_OF_CELL = 1e-3;
+
 // The record of the channel that is looked at, for one of as many pixels as there are.
 fn carried_by(slot: u32, pixels: u32) -> vec4u {
     return carried[seen_channel.number * pixels + slot] ^ NOTHING_CARRIED;
@@ -126,7 +129,7 @@ fn part_of(ray: vec2f, near: f32, far: f32) -> vec2f {
 fn sheet_of(slab: Slab, light: Lighting) -> vec4f {
     let part = part_of(slab.ray, slab.near, slab.far);
     let share = select(0.0, shown_share(slab.ray, slab.near), is_drawn(0.5 * (slab.near + slab.far)));
-    let seen = look(slab.first, slab.last, slab.own, table_at(slab.at, 0.5 * (part.x + part.y)), light);
+    let seen = look(slab.first, slab.last, slab.own, table_at(slab.at, 0.5 * (part.x + part.y), 0.0), light);
     return vec4f(seen.color, 1.0) * (seen.amount * share * frame.slab_width * slab.per_depth);
 }
 
@@ -160,7 +163,7 @@ fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
         return Composited(image, vec4u(), vec4f(), FAR, false);
     }
     let sheet_depth = slab.near + share * frame.slab_width;
-    let table = table_at(slab.at, sheet_depth);
+    let table = table_at(slab.at, sheet_depth, 0.0);
     let gradient = gradient_between(slab.first, slab.last, share);
     let color = colored(color_at(table, mix(slab.first.x, slab.last.x, share)), slab.own);
     return Composited(vec4f(shade(color.rgb, gradient, light), 1.0), vec4u(), vec4f(), sheet_depth, true);
@@ -213,7 +216,7 @@ fn choose(slab: Slab, image: vec4f, before: vec4u, color_before: vec4f, light: L
     if !is_chosen {
         return Composited(image, carried, carried_color, FAR, false);
     }
-    let table = table_at(slab.at, sheet_depth);
+    let table = table_at(slab.at, sheet_depth, select(0.0, HAIR_OF_CELL, COMPOSITING == AVERAGE));
     var seen = Look();
     if COMPOSITING == AVERAGE {
         let mean = slab_integral(table, point.x, point.x);

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 
 use super::means::Means;
 use super::ray::{PixelRay, PixelRays};
@@ -81,6 +81,12 @@ impl RayMode {
         let inside = ray.inside(self.kept.as_deref().unwrap_or_default());
         let end = self.surfaces.as_ref().map_or(f64::INFINITY, |surfaces| surfaces.depth(pixel));
         inside.start..inside.end.min(end)
+    }
+
+    /// The voxel whose cell has the middle of the stretch of a pixel's ray that shows something.
+    pub(super) fn middle_voxel(&self, pixel: [usize; 2], grid: &Grid) -> UVec3 {
+        let ray = self.rays.of(pixel);
+        ray.middle_voxel(&self.shown(&ray, pixel), grid)
     }
 
     /// The slab from which a tile's are counted: where its middle enters the volume, so that the numbers are small, and rounded in the same way

@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use glam::{DVec2, DVec3, DVec4};
+use glam::{DVec2, DVec3, DVec4, UVec3};
 
+use crate::geometry::pixel_ray;
 use crate::geometry::slab::SlabGrid;
 use crate::geometry::view_geometry::{Rays, ViewGeometry};
 use crate::settings::clip::HalfSpace;
@@ -19,12 +20,10 @@ pub(super) struct PixelRays {
     middle: DVec2,
 }
 
-/// The ray of a pixel's centre, by its depth along w: positions in `unit`s from the volume's centre.
+/// The ray of a pixel's centre, and how it passes through slabs.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PixelRay {
-    origin: DVec3,
-    /// The change of position per `unit` of depth.
-    along: DVec3,
+    line: pixel_ray::PixelRay,
     /// The number of the slab where the depth is 0.
     slab_at_origin: f64,
     /// The number of slabs per `unit` of depth; negative where a ray far off the axis meets slices in the opposite order.
@@ -42,15 +41,12 @@ impl PixelRays {
     }
 
     /// The ray of a pixel, counted from the upper left.
-    pub(super) fn of(&self, [x, y]: [usize; 2]) -> PixelRay {
-        let place = DVec2::new(x as f64, y as f64) + 0.5 - self.middle;
-        let origin = self.rays.at(place, 0.0);
-        let along = self.rays.at(place, 1.0) - origin;
+    pub(super) fn of(&self, pixel: [usize; 2]) -> PixelRay {
+        let line = pixel_ray::PixelRay::of(&self.rays, pixel, self.middle);
         PixelRay {
-            origin,
-            along,
-            slab_at_origin: (self.depth.dot(origin.extend(1.0)) - self.slabs.origin) / self.slabs.width,
-            slabs_per_depth: self.depth.truncate().dot(along) / self.slabs.width,
+            line,
+            slab_at_origin: (self.depth.dot(line.origin.extend(1.0)) - self.slabs.origin) / self.slabs.width,
+            slabs_per_depth: self.depth.truncate().dot(line.along) / self.slabs.width,
         }
     }
 }
@@ -58,33 +54,27 @@ impl PixelRays {
 impl PixelRay {
     /// The depths inside of all half spaces.
     pub(super) fn inside(&self, half_spaces: &[HalfSpace]) -> Range<f64> {
-        let (mut start, mut end) = (f64::NEG_INFINITY, f64::INFINITY);
-        for HalfSpace { normal, offset } in half_spaces {
-            let (at_origin, slope) = (normal.dot(self.origin) + offset, normal.dot(self.along));
-            if slope > 0.0 {
-                start = start.max(-at_origin / slope);
-            } else if slope < 0.0 {
-                end = end.min(-at_origin / slope);
-            } else if at_origin < 0.0 {
-                end = f64::NEG_INFINITY;
-            }
-        }
-        start..end
+        self.line.inside(half_spaces)
     }
 
     /// The position at a depth.
     pub(super) fn at(&self, depth: f64) -> DVec3 {
-        self.origin + depth * self.along
+        self.line.at(depth)
+    }
+
+    /// The voxel whose cell has the middle of a range of depths.
+    pub(super) fn middle_voxel(&self, depths: &Range<f64>, grid: &Grid) -> UVec3 {
+        self.line.middle_voxel(depths, grid)
     }
 
     /// The unit vector towards the eye.
     pub(super) fn toward_eye(&self) -> DVec3 {
-        -self.along.normalize()
+        -self.line.along.normalize()
     }
 
     /// The length of the ray to a `unit` of depth.
     pub(super) fn length(&self) -> f64 {
-        self.along.length()
+        self.line.along.length()
     }
 
     /// Slabs that the ray passes through in a `unit` of depth.

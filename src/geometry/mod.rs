@@ -4,6 +4,7 @@
 pub mod footprint;
 pub mod grid_warp;
 pub mod means;
+pub(crate) mod pixel_ray;
 pub(crate) mod plane_bounds;
 pub mod plane_geometry;
 pub mod slab;

@@ -102,9 +102,9 @@ fn means(
         if count > 0.0 {
             *color = own.map(|sum| f32::from_bits(sum) / count);
             let value = numbers.base + f64::from(sum) / f64::from(count) / numbers.scale;
-            return Extreme { value: value as f32, counted: Extreme::MIDDLE + count };
+            return Extreme { value: value as f32, counted: Extreme::MIDDLE + count, ..Extreme::default() };
         }
-        Extreme { value: 0.0, counted: if color[3] == 0.0 { 0.0 } else { Extreme::MIDDLE } }
+        Extreme { counted: if color[3] == 0.0 { 0.0 } else { Extreme::MIDDLE }, ..Extreme::default() }
     };
     Ok(held.into_iter().zip(colors).map(mean).collect())
 }
@@ -122,8 +122,8 @@ fn extremes(
     let span = if high > low { high - low } else { 1.0 };
     let extreme = |([.., bits], color): ([u32; 4], &[f32; 4])| match f32::from_bits(bits ^ NO_NUMBER.to_bits()) {
         NO_NUMBER if color[3] == 0.0 => Extreme::default(),
-        NO_NUMBER => Extreme { value: 0.0, counted: Extreme::MIDDLE },
-        number => Extreme { value: (number - low) / span, counted: Extreme::POINT },
+        NO_NUMBER => Extreme { counted: Extreme::MIDDLE, ..Extreme::default() },
+        number => Extreme { value: (number - low) / span, counted: Extreme::POINT, ..Extreme::default() },
     };
     Ok(held.into_iter().zip(colors).map(extreme).collect())
 }

@@ -25,6 +25,9 @@ pub struct Extreme {
     /// [`Self::POINT`] for a point on a plane, and for `average` 1 more for each further one; [`Self::MIDDLE`] for the middle of the visible stretch, which
     /// counts where no plane has a point, and 0 if nothing counted.
     pub counted: f32,
+    /// For `average` of a segmented volume with tables of labels, the label of the voxel in the middle of the stretch of the pixel's ray that counts,
+    /// where points on planes count; otherwise 0.
+    pub label: f32,
 }
 
 impl Extreme {
@@ -32,6 +35,11 @@ impl Extreme {
     pub const POINT: f32 = 2.0;
     /// Only the middle of the visible stretch counted.
     pub const MIDDLE: f32 = 1.0;
+
+    /// Whether points on planes count.
+    pub(crate) fn has_points(&self) -> bool {
+        self.counted > Self::MIDDLE
+    }
 }
 
 impl Content {
@@ -66,7 +74,8 @@ impl Rule {
                     let share = f64::from(further) / f64::from(points + further);
                     let mean = |a: f32, b: f32| (f64::from(a) + (f64::from(b) - f64::from(a)) * share) as f32;
                     *front = std::array::from_fn(|channel| mean(front[channel], back[channel]));
-                    *chosen = Extreme { value: mean(chosen.value, other.value), counted: chosen.counted + further };
+                    let value = mean(chosen.value, other.value);
+                    *chosen = Extreme { value, counted: chosen.counted + further, ..*chosen };
                 } else if self.is_better(*other, *chosen) {
                     (*front, *chosen) = (*back, *other);
                 }

@@ -1,5 +1,6 @@
 //! What identifies a part, as JSON in its file (SPEC §11).
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::DVec3;
@@ -11,7 +12,7 @@ use crate::image::ImageError;
 use crate::image::channels::Joining;
 use crate::image::open::content;
 use crate::scene::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
-use crate::settings::transfer_function::{Ramp, check_iso_ranges, check_ramps};
+use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::settings::window::{Region, Window};
 
 /// The version of the description.
@@ -63,15 +64,57 @@ struct Mean {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     iso_ranges: Option<Vec<[f64; 2]>>,
     has_colors: bool,
+    /// Of a segmented volume.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    labels: BTreeMap<u16, OfLabel>,
+}
+
+/// A label's own tables.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct OfLabel {
+    visible: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    color: Option<Vec<(f64, [f64; 3])>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    opacity: Option<Vec<(f64, f64)>>,
+}
+
+fn points_of(color: &Ramp<DVec3>) -> Vec<(f64, [f64; 3])> {
+    color.points().iter().map(|(value, rgb)| (*value, rgb.to_array())).collect()
+}
+
+fn color_of(points: Vec<(f64, [f64; 3])>) -> Result<Ramp<DVec3>, String> {
+    let points = points.into_iter().map(|(value, rgb)| (value, DVec3::from(rgb))).collect();
+    Ramp::new(points).map_err(|error| format!("color: {error}"))
+}
+
+fn opacity_of(points: Vec<(f64, f64)>) -> Result<Ramp<f64>, String> {
+    Ramp::new(points).map_err(|error| format!("opacity: {error}"))
+}
+
+impl From<&LabelTables> for OfLabel {
+    fn from(tables: &LabelTables) -> Self {
+        let opacity = tables.opacity.as_ref().map(|opacity| opacity.points().to_vec());
+        Self { visible: tables.visible, color: tables.color.as_ref().map(points_of), opacity }
+    }
+}
+
+impl OfLabel {
+    fn tables(self) -> Result<LabelTables, String> {
+        let (color, opacity) = (self.color.map(color_of).transpose()?, self.opacity.map(opacity_of).transpose()?);
+        Ok(LabelTables { visible: self.visible, color, opacity, gradient_opacity: None })
+    }
 }
 
 impl From<&MeanTables> for Mean {
     fn from(tables: &MeanTables) -> Self {
         Self {
-            color: tables.color.points().iter().map(|(value, rgb)| (*value, rgb.to_array())).collect(),
-            opacity: tables.opacity.points().to_vec(),
-            iso_ranges: tables.iso_ranges.clone(),
+            color: points_of(&tables.transfer.color),
+            opacity: tables.transfer.opacity.points().to_vec(),
+            iso_ranges: tables.transfer.iso_ranges.clone(),
             has_colors: tables.has_colors,
+            labels: tables.transfer.labels.iter().map(|(label, tables)| (*label, tables.into())).collect(),
         }
     }
 }
@@ -79,13 +122,13 @@ impl From<&MeanTables> for Mean {
 impl Mean {
     /// The tables, if they are ones of a transfer function.
     fn tables(self) -> Result<MeanTables, String> {
-        let Self { color, opacity, iso_ranges, has_colors } = self;
-        let color = color.into_iter().map(|(value, rgb)| (value, DVec3::from(rgb))).collect();
-        let color = Ramp::new(color).map_err(|error| format!("color: {error}"))?;
-        let opacity = Ramp::new(opacity).map_err(|error| format!("opacity: {error}"))?;
-        let checked = check_ramps("mean", Some(&color), Some(&opacity), None);
-        checked.and_then(|()| check_iso_ranges("mean", iso_ranges.as_deref())).map_err(|error| error.to_string())?;
-        Ok(MeanTables { color, opacity, iso_ranges, has_colors })
+        let Self { color, opacity, iso_ranges, has_colors, labels } = self;
+        let mut transfer = TransferFunction::by_value(color_of(color)?, opacity_of(opacity)?);
+        let of_label = |(label, tables): (u16, OfLabel)| Ok::<_, String>((label, tables.tables()?));
+        transfer.labels = labels.into_iter().map(of_label).collect::<Result<_, _>>()?;
+        transfer.iso_ranges = iso_ranges;
+        transfer.check_as("mean").map_err(|error| error.to_string())?;
+        Ok(MeanTables { transfer, has_colors })
     }
 }
 

@@ -113,8 +113,12 @@ impl Part {
 
 /// The names of a part's channels: those of images after the first have their numbers before them.
 pub(super) fn channel_names(identity: &Identity) -> Vec<String> {
-    const ALL: [&str; 6] = ["R", "G", "B", "A", "value", "counted"];
-    let names = if identity.has_extremes() { &ALL } else { &ALL[..4] };
+    const ALL: [&str; 7] = ["R", "G", "B", "A", "value", "counted", "label"];
+    let names = match (identity.has_extremes(), identity.notes_labels()) {
+        (false, _) => &ALL[..4],
+        (true, false) => &ALL[..6],
+        (true, true) => &ALL,
+    };
     let of_image = |image: usize| {
         names.iter().map(move |name| if image == 0 { (*name).to_owned() } else { format!("{image}.{name}") })
     };
@@ -123,7 +127,8 @@ pub(super) fn channel_names(identity: &Identity) -> Vec<String> {
 
 /// The pixels of a part, channel by channel.
 pub(super) fn to_channels(part: &Part) -> Vec<Vec<f32>> {
-    part.contents().flat_map(to_channels_of).collect()
+    let per_image = channel_names(&part.identity).len() / part.identity.images;
+    part.contents().flat_map(|of_image| to_channels_of(of_image).into_iter().take(per_image)).collect()
 }
 
 fn to_channels_of(Content { colors, extremes }: &Content) -> Vec<Vec<f32>> {
@@ -132,6 +137,7 @@ fn to_channels_of(Content { colors, extremes }: &Content) -> Vec<Vec<f32>> {
     if !extremes.is_empty() {
         channels.push(extremes.iter().map(|extreme| extreme.value).collect());
         channels.push(extremes.iter().map(|extreme| extreme.counted).collect());
+        channels.push(extremes.iter().map(|extreme| extreme.label).collect());
     }
     channels
 }
@@ -140,12 +146,11 @@ fn to_channels_of(Content { colors, extremes }: &Content) -> Vec<Vec<f32>> {
 fn from_channels(channels: &[Vec<f32>]) -> Content {
     let pixels = channels.first().map_or(0, Vec::len);
     let colors = (0..pixels).map(|at| std::array::from_fn(|channel| channels[channel][at])).collect();
-    let extremes = match channels {
-        [_, _, _, _, value, counted] => {
-            value.iter().zip(counted).map(|(&value, &counted)| Extreme { value, counted }).collect()
-        }
-        _ => Vec::new(),
+    let extreme = |at: usize| {
+        let [value, counted, label] = [4, 5, 6].map(|channel| channels.get(channel).map_or(0.0, |of| of[at]));
+        Extreme { value, counted, label }
     };
+    let extremes = if channels.len() > 4 { (0..pixels).map(extreme).collect() } else { Vec::new() };
     Content { colors, extremes }
 }
 

@@ -39,8 +39,11 @@ mod split;
 
 use std::ops::Range;
 
+use glam::UVec3;
+
 pub use content::{Content, Extreme};
 pub use mean::MeanTables;
+pub(crate) use mean::note_labels;
 pub use merge::MergeError;
 #[cfg(feature = "cpu")]
 pub(crate) use resolve::Resolver;
@@ -101,9 +104,16 @@ impl Part {
         (volume, scene): (&OpenVolume, &Scene),
         view: &ViewGeometry,
         window: &Window,
-        content: Content,
+        mut content: Content,
     ) -> Result<Self, RenderError> {
-        Ok(Self::named(Identity::of((volume, scene), view)?, window.clone(), vec![content]))
+        let identity = Identity::of((volume, scene), view)?;
+        if let (true, OpenVolume::Whole(volume)) = (identity.notes_labels(), volume) {
+            let grid = volume.grid();
+            let label = |voxel: &UVec3| volume.label(grid.index_of(*voxel)).unwrap_or_default();
+            let labels_at = |voxels: &[UVec3]| Ok::<_, RenderError>(voxels.iter().map(label).collect());
+            note_labels((view, scene, grid), &window.region, &mut content, labels_at)?;
+        }
+        Ok(Self::named(identity, window.clone(), vec![content]))
     }
 
     /// A part with its slabs and pixels as its name.
@@ -143,6 +153,11 @@ impl Identity {
         self.rule().has_extremes()
     }
 
+    /// Whether pixels note labels, whose tables classify means.
+    pub(crate) fn notes_labels(&self) -> bool {
+        self.means.iter().any(MeanTables::has_labels)
+    }
+
     fn rule(&self) -> Rule {
         Rule { compositing: self.compositing, classification: self.classification }
     }
@@ -176,14 +191,6 @@ pub(crate) fn check_sheets(volume: &Volume, scene: &Scene) -> Result<(), Setting
     ))
 }
 
-/// Whether the means of rays are classified by tables of labels. Which label's table it is, the whole ray decides.
-pub(crate) fn has_labelled_means(volume: &Volume, scene: &Scene) -> bool {
-    let transfer = scene.resolve(volume);
-    let mut channels = volume.channels().zip(transfer.channels());
-    let has_tables = channels.any(|(channel, of)| channel.labels().is_some() && !of.labels.is_empty());
-    has_tables && mean::shows_means(scene.splatting.compositing, scene.classification(volume))
-}
-
 /// Checks, before anything is drawn, that a scene has parts, and that a window is one.
 ///
 /// # Errors
@@ -203,10 +210,6 @@ pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(
     if let Some(economy) = splatting.experimental.in_use() {
         let found = format!("{} for a part of an image", economy.value);
         return Err(SettingError::new(economy.key, found, economy.off.to_string()));
-    }
-    if has_labelled_means(volume, scene) {
-        let found = "\"average\" with splatting.classification = \"after\" and tables of labels for a part of an image";
-        return Err(SettingError::new("splatting.compositing", found, "another compositing, or \"before\" with it"));
     }
     let Range { start, end } = window.slabs;
     if start > end {

@@ -231,13 +231,15 @@ impl TransferFunction {
     /// If a colour, opacity or factor is not in [0, 1] (in labels' tables, too), the list of iso-ranges is empty, or an iso-range is
     /// reversed or not finite.
     pub fn check(&self) -> Result<(), SettingError> {
-        let check = |table: &str, of: &Self| {
-            check_ramps(table, Some(&of.color), Some(&of.opacity), of.gradient_opacity.as_ref())?;
-            check_iso_ranges(table, of.iso_ranges.as_deref())?;
-            check_labels(table, &of.labels)
-        };
-        check("transfer", self)?;
-        (1..).zip(&self.further).try_for_each(|(number, of)| check(&format!("channel[{number}].transfer"), of))
+        self.check_as("transfer")?;
+        (1..).zip(&self.further).try_for_each(|(number, of)| of.check_as(&format!("channel[{number}].transfer")))
+    }
+
+    /// [`Self::check`] of one channel, whose tables have a name in errors.
+    pub(crate) fn check_as(&self, table: &str) -> Result<(), SettingError> {
+        check_ramps(table, Some(&self.color), Some(&self.opacity), self.gradient_opacity.as_ref())?;
+        check_iso_ranges(table, self.iso_ranges.as_deref())?;
+        check_labels(table, &self.labels)
     }
 
     /// A transfer function with only colour and opacity.

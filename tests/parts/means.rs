@@ -59,17 +59,23 @@ fn parts_merge_by_every_backend() {
 
 /// Some pixels' means are of many points in several parts, some have one point, and some only the middle of their rays.
 fn compare_ranges(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
-    let headless = headless(backend);
-    let whole = headless.render_volume(Arc::clone(volume), scene).unwrap().image;
-    let all = parts(headless, volume, scene, 3);
+    let all = merging_parts(backend, volume, scene);
     let counts: Vec<f32> = all.iter().flat_map(|part| &part.content.extremes).map(|mean| mean.counted).collect();
     for counted in [0.0, Extreme::MIDDLE, Extreme::POINT, 4.0] {
         assert!(counts.contains(&counted), "{backend} {counted}");
     }
-    let merged = Image::merge(all).unwrap();
+}
+
+/// The parts of an image, which merge into it.
+fn merging_parts(backend: Backend, volume: &Arc<Volume>, scene: &Scene) -> Vec<Part> {
+    let headless = headless(backend);
+    let whole = headless.render_volume(Arc::clone(volume), scene).unwrap().image;
+    let all = parts(headless, volume, scene, 3);
+    let merged = Image::merge(all.clone()).unwrap();
     assert_at_most(largest_difference(&merged, &whole), 1e-6, format!("{backend} {:?}", scene.splatting));
     let shown = whole.pixels.iter().filter(|pixel| **pixel != whole.pixels[0]).count();
     assert!(shown * 10 > whole.pixels.len(), "{shown}");
+    all
 }
 
 /// What a part says of values does not depend on the range that numbers are scaled by.
@@ -120,17 +126,16 @@ fn tables_belong_to_means() {
     let message = reopened(&|part| part.identity.compositing = Compositing::Maximum).unwrap_err();
     assert!(message.contains("part.means: found 1 tables, allowed: 0: "), "{message}");
     let message = reopened(&|part| {
-        let tables = &mut part.identity.means[0];
-        tables.opacity = Ramp::new(vec![(0.0, 0.5), (1.0, 1.5)]).unwrap();
+        part.identity.means[0].transfer.opacity = Ramp::new(vec![(0.0, 0.5), (1.0, 1.5)]).unwrap();
     });
     let message = message.unwrap_err();
     assert!(message.contains("part.means: found mean.opacity[1][1]: found 1.5"), "{message}");
-    let message = reopened(&|part| part.identity.means[0].iso_ranges = Some(vec![[2.0, 1.0]]));
+    let message = reopened(&|part| part.identity.means[0].transfer.iso_ranges = Some(vec![[2.0, 1.0]]));
     assert!(message.unwrap_err().contains("mean.iso_ranges[0]"));
     // Tables that are too long for the description in an NPZ file are refused before anything is written; EXR holds them.
     let long = (0..60_000).map(|at| (f64::from(at) / 7.0, 0.5)).collect();
     let mut part = part;
-    part.identity.means[0].opacity = Ramp::new(long).unwrap();
+    part.identity.means[0].transfer.opacity = Ramp::new(long).unwrap();
     let message = part.save(&folder.path().join("long.npz")).unwrap_err().to_string();
     assert!(message.contains("part.json: found ") && message.contains("or a file .exr"), "{message}");
     assert!(!folder.path().join("long.npz").exists());
@@ -138,20 +143,59 @@ fn tables_belong_to_means() {
     assert_eq!(Part::open(&folder.path().join("long.exr")).unwrap().identity, part.identity);
 }
 
-/// Which label's table classifies a mean depends on the whole ray.
-#[test]
-fn tables_of_labels_are_refused() {
-    let (volume, mut scene) = means(24);
+/// A head in thirds of one label each, of which one has tables of its own, one is invisible, and one is like a volume that is not segmented.
+fn labelled(size: u32) -> (Arc<Volume>, Scene) {
+    let (volume, mut scene) = means(size);
     let dims = volume.dims();
-    let values = (0..dims.element_product()).map(|index| (index % 2) as u16).collect();
+    let label = |index: u32| 3 * (volume.grid().voxel_at(index).y * 3 / dims.y) as u16;
+    let values = (0..dims.element_product()).map(label).collect();
     let labels = Labels { origin: "test".to_owned(), dims, spacing: None, values, names: BTreeMap::new() };
-    let volume = Arc::new(Volume::clone(&volume).with_labels(labels).unwrap());
-    compare_ranges(Backend::Cpu, &volume, &scene);
-    scene.transfer.labels = BTreeMap::from([(1, LabelTables { visible: false, ..LabelTables::default() })]);
-    let headless = headless(Backend::Cpu);
-    let mut view = headless.view(volume, &scene).unwrap();
-    let window = Window { slabs: 0..2, region: Region { x: 0, y: 0, width: 4, height: 4 } };
-    let message = headless.draw_part(&mut view, &window).unwrap_err().to_string();
-    let expected = "splatting.compositing: found \"average\" with splatting.classification = \"after\" and tables of labels for a part";
-    assert!(message.starts_with(expected), "{message}");
+    let color = Ramp::new(vec![(0.0, DVec3::X), (255.0, DVec3::Y)]).unwrap();
+    let opacity = Ramp::new(vec![(0.0, 0.0), (60.0, 0.9)]).unwrap();
+    let own = LabelTables { color: Some(color), opacity: Some(opacity), ..LabelTables::default() };
+    let hidden = LabelTables { visible: false, ..LabelTables::default() };
+    scene.transfer.labels = BTreeMap::from([(0, hidden), (3, own)]);
+    (Arc::new(Volume::clone(&volume).with_labels(labels).unwrap()), scene)
+}
+
+/// The voxel in the middle of a ray's stretch decides whose tables classify the mean. Most parts do not show that voxel.
+#[test]
+fn labels_in_the_middle_of_rays_decide() {
+    let (volume, mut scene) = labelled(40);
+    for projection in [
+        Projection::Orthographic { height: None },
+        Projection::Perspective { fov_y: 40.0, distance: None, near: Some(6.0) },
+    ] {
+        scene.camera.projection = projection;
+        for crop in [None, Some([DVec3::new(-15.0, -90.0, -90.0), DVec3::new(17.0, 90.0, 90.0)])] {
+            scene.clip.crop = crop;
+            for backend in [Backend::Cpu, Backend::Reference, Backend::Gpu] {
+                let all = merging_parts(backend, &volume, &scene);
+                let means = || all.iter().flat_map(|part| &part.content.extremes);
+                let noted = |label: f32| means().any(|mean| mean.label == label && mean.counted >= Extreme::POINT);
+                assert!([0.0, 3.0, 6.0].into_iter().all(noted));
+            }
+        }
+    }
+}
+
+/// Files state the tables of labels, and pixels note labels.
+#[test]
+fn files_hold_labels_and_their_tables() {
+    let (volume, scene) = labelled(24);
+    let has_label = |part: &Part| part.content.extremes.iter().any(|mean| mean.label == 3.0);
+    let part = parts(headless(Backend::Cpu), &volume, &scene, 2).into_iter().find(has_label).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["part.npz", "part.exr"] {
+        let path = folder.path().join(name);
+        part.save(&path).unwrap();
+        assert_eq!(Part { name: part.name.clone(), ..Part::open(&path).unwrap() }, part, "{name}");
+    }
+    let mut wrong = part;
+    let tables = wrong.identity.means[0].transfer.labels.get_mut(&3).unwrap();
+    tables.opacity = Some(Ramp::new(vec![(0.0, 0.5), (1.0, 1.5)]).unwrap());
+    let path = folder.path().join("wrong.npz");
+    wrong.save(&path).unwrap();
+    let message = Part::open(&path).unwrap_err().to_string();
+    assert!(message.contains("part.means: found mean.label[3].opacity[1][1]: found 1.5"), "{message}");
 }

@@ -321,6 +321,11 @@ impl Frame<'_> {
         self.matter.label(grid.index_of((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3()))
     }
 
+    /// The label of the voxel whose cell contains the middle of a pixel's stretch: that which parts of an image note (SPEC §11).
+    pub(super) fn middle_label(&self, pixel: [usize; 2]) -> Option<u16> {
+        self.matter.label(self.grid.index_of(self.rays.middle_voxel(pixel, &self.grid)))
+    }
+
     /// A place on a pixel's ray, in voxels.
     pub(super) fn voxel_at(&self, pixel: [usize; 2], slab: f64) -> DVec3 {
         let (grid, ray) = (&self.grid, self.rays.rays.of(pixel));

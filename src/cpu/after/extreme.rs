@@ -71,10 +71,10 @@ impl Chosen {
         let span = if high > low { high - low } else { 1.0 };
         let of = |row: usize, at: usize| {
             let (best, [near, far]) = (&self.best[row], &self.middle[row]);
-            let extreme = |number: f32, counted| Extreme { value: (number - low) / span, counted };
+            let extreme = |number: f32, counted| Extreme { value: (number - low) / span, counted, label: 0.0 };
             if best.weight[at] > 0.0 && is_average {
                 let value = frame.value(best.number[at] / best.weight[at]) as f32;
-                return Extreme { value, counted: Extreme::MIDDLE + best.weight[at] };
+                return Extreme { value, counted: Extreme::MIDDLE + best.weight[at], label: 0.0 };
             }
             if best.weight[at] > 0.0 {
                 return extreme(best.number[at], Extreme::POINT);
@@ -266,7 +266,11 @@ impl Frame<'_> {
         let (mut alphas, mut colors) = ([0.0; LANES], [[0.0; LANES]; 3]);
         for lane in (0..LANES).filter(|lane| lanes >> lane & 1 == 1) {
             let at = [looks.origin[0] + column, looks.origin[1] + row];
-            let label = if self.labels { self.label(at, lane, looks.rays.slab(places[lane])) } else { None };
+            let label = match (self.labels, is_average) {
+                (false, _) => None,
+                (true, true) => self.middle_label([at[0] + lane, at[1]]),
+                (true, false) => self.label(at, lane, looks.rays.slab(places[lane])),
+            };
             let tables = self.transfer.tables(label);
             let value = self.value(numbers[lane]);
             alphas[lane] = match is_average {

@@ -26,13 +26,13 @@ use crate::cpu::shade::Shader;
 use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::geometry::view_geometry::ViewGeometry;
 
+use crate::geometry::pixel_ray::counted;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::tile_grid;
 use crate::parallel::prelude::*;
 use crate::part::Resolver;
 use crate::scene::Scene;
-use crate::settings::clip::HalfSpace;
 use crate::settings::shading::MIN_GRADIENT;
 use crate::settings::splatting::{Classification, Compositing, Order};
 use crate::settings::transfer_function::TransferFunction;
@@ -137,7 +137,7 @@ impl<'a> Frame<'a> {
                 threshold: (splatting.culling && can_hide).then_some(splatting.opacity_threshold as f32),
                 first_hit: first_hit.map(|opacity| opacity as f32),
             },
-            rays: RayMode::within(&view, &grid, kept(&view, scene, &grid), surfaces),
+            rays: RayMode::within(&view, &grid, counted(&view, &scene.clip, &grid), surfaces),
             drawn,
             compositing: splatting.compositing,
             hair: HAIR_OF_RANGE * (numbers.range[1] - numbers.range[0]),
@@ -279,18 +279,6 @@ impl<'a> Frame<'a> {
         };
         self.matter.shown().par_iter().map(of_brick).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]])
     }
-}
-
-/// The half spaces within which pixels' rays count: the box of voxel cells, beyond the near plane, within the cuts.
-fn kept(view: &ViewGeometry, scene: &Scene, grid: &Grid) -> Vec<HalfSpace> {
-    let (center, centers) = grid.whole();
-    let mut kept = if scene.clip.is_empty() { Vec::new() } else { scene.clip.half_spaces(grid) };
-    kept.extend(HalfSpace::around(center, centers + 0.5, grid));
-    kept.extend(view.perspective.map(|perspective| {
-        let (eye, w) = (perspective.eye, view.basis.w);
-        HalfSpace { normal: w, offset: -eye.position.dot(w) - eye.near }
-    }));
-    kept
 }
 
 /// The slabs from the first to the last that the cells of the bricks reach that may be shown; of all voxels, if these are not known.

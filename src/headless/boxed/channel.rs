@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 use std::sync::Arc;
 
-use glam::UVec3;
+use glam::{DVec3, UVec3};
 
 use super::kept::Kept;
 use crate::error::RenderError;
@@ -20,6 +20,9 @@ use crate::volume::{
 
 /// The maximum number of chunks of a level.
 const MOST_CHUNKS: u64 = 1 << 24;
+
+/// The most voxels along each axis of what is read for single ones.
+const BLOCK: u32 = 32;
 
 /// A box of voxels: the first one, and the one behind the last.
 #[derive(Clone, Copy)]
@@ -107,6 +110,28 @@ impl<'a> ChannelChunks<'a> {
         let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read(within)?.values)?;
         let labels = Labels { origin, dims: grid.dims, spacing: None, values, names: BTreeMap::new() };
         Ok(Some(volume.with_labels(labels)?))
+    }
+
+    /// The labels of some voxels, 0 without any, which are read in blocks.
+    ///
+    /// # Errors
+    /// If a store cannot be read, or holds a value that is no label.
+    pub(super) fn labels_at(&mut self, voxels: &[UVec3]) -> Result<Vec<u16>, RenderError> {
+        let mut found = vec![0; voxels.len()];
+        let Some(labels) = &mut self.labels else { return Ok(found) };
+        let side = labels.level.chunk.min(UVec3::splat(BLOCK));
+        let mut blocks = BTreeMap::<[u32; 3], Vec<usize>>::new();
+        for (at, voxel) in voxels.iter().enumerate() {
+            blocks.entry((voxel / side).to_array()).or_default().push(at);
+        }
+        for block in blocks.into_values() {
+            let ends = (UVec3::MAX, UVec3::ZERO);
+            let (low, last) = block.iter().fold(ends, |(low, last), &at| (low.min(voxels[at]), last.max(voxels[at])));
+            let (within, grid) = (VoxelBox { low, end: last + 1 }, Grid::new(last + 1 - low, DVec3::ONE));
+            let own = labels_of(&labels.of.origin, (low, grid.dims, 1), labels.read(within)?.values)?;
+            block.into_iter().for_each(|at| found[at] = own[grid.index_of(voxels[at] - low) as usize]);
+        }
+        Ok(found)
     }
 
     /// Whether anything of the chunks in a box can be seen.

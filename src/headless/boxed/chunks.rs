@@ -9,6 +9,7 @@ use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::part::{self, Content};
 use crate::scene::Scene;
 use crate::settings::splatting::Classification;
 use crate::settings::window::Region;
@@ -135,6 +136,22 @@ impl<'a> Chunks<'a> {
         self.most_held = self.most_held.max(within.voxels().saturating_mul(self.voxel_bytes()));
         let first = filled.remove(0);
         Ok(Some((first.with_channels(&self.volume.first.values.origin, filled)?, numbers)))
+    }
+
+    /// Notes the labels that decide which tables classify a region's means, of a volume of one channel.
+    ///
+    /// # Errors
+    /// If a store cannot be read, or holds a value that is no label.
+    pub(super) fn note_labels(
+        &mut self,
+        scene: &Scene,
+        region: &Region,
+        content: &mut Content,
+    ) -> Result<(), RenderError> {
+        let Self { view, volume, channels, .. } = self;
+        part::note_labels((view, scene, volume.grid()), region, content, |voxels| {
+            channels.first_mut().map_or_else(|| Ok(Vec::new()), |channel| channel.labels_at(voxels))
+        })
     }
 
     /// The error for a view whose boxes do not fit.

@@ -146,7 +146,10 @@ impl Walk<'_> {
     fn region(&mut self, region: Region) -> Result<(), RenderError> {
         let nothing = Content::empty(region.pixels(), self.identity.has_extremes());
         // What opaque pixels hide counts as drawn.
-        let (slabs, content) = (self.slabs.clone(), self.behind(region, self.slabs.clone(), nothing)?);
+        let (slabs, mut content) = (self.slabs.clone(), self.behind(region, self.slabs.clone(), nothing)?);
+        if self.identity.notes_labels() {
+            self.chunks.note_labels(&self.scene, &region, &mut content)?;
+        }
         self.parts.push(Part::named(self.identity.clone(), Window { slabs, region }, vec![content]));
         Ok(())
     }
@@ -267,11 +270,6 @@ fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(),
     #[cfg(feature = "cpu")]
     if backend == Backend::Cpu {
         crate::cpu::check(scene)?;
-    }
-    if part::has_labelled_means(&volume.sample, scene) {
-        let found =
-            "\"average\" with splatting.classification = \"after\" for tables of labels of a volume that is streamed";
-        return Err(SettingError::new("splatting.compositing", found, "another one, or more memory").into());
     }
     Ok(())
 }

@@ -34,7 +34,10 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
     let [min, max] = pixel.frame().field.range();
     let share = if max > min { (value - min) / (max - min) } else { 0.0 };
     let kept = if compositing == Compositing::Average { value } else { share };
-    let tables = pixel.tables(sheet);
+    let tables = match compositing {
+        Compositing::Average => pixel.middle_tables(),
+        _ => pixel.tables(sheet),
+    };
     let base = own.map_or_else(|| tables.color.at(value), DVec4::truncate);
     let opacity = own.map_or(1.0, |own| own.w);
     let color = if compositing == Compositing::Average {
@@ -45,7 +48,7 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
         shading::color(&scene.shading, base, gradient, pixel.to_eye()).extend(1.0) * alpha * opacity
     };
     let first_hit = pixel.frame().host.first_hit.filter(|&opacity| color.w >= opacity).map(|_| sheet);
-    Composited { color, first_hit, extreme: Extreme { value: kept as f32, counted }, own }
+    Composited { color, first_hit, extreme: Extreme { value: kept as f32, counted, label: 0.0 }, own }
 }
 
 /// The planes' points within the stretch that have a value, of those that are drawn, each as plane and value. The plane before a slab belongs

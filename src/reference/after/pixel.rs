@@ -7,6 +7,7 @@ use glam::{DVec3, DVec4, UVec2};
 use super::field::nearest;
 use super::slab_integral::SlabIntegral;
 use super::{Frame, extreme, surface};
+use crate::geometry::pixel_ray::HAIR_OF_CELL;
 use crate::part::Extreme;
 use crate::reference::composite::composite_pixel;
 use crate::reference::cut::{self, PixelRay};
@@ -138,7 +139,16 @@ impl<'a> Pixel<'a> {
 
     /// The tables of the voxel whose cell contains a position.
     pub fn tables(&self, sheet: f64) -> Tables<'a> {
-        let cell = || nearest(&self.frame.geometry.grid, self.at(sheet)) as usize;
+        self.tables_at(self.at(sheet))
+    }
+
+    /// Those for the middle of the stretch; where cells meet, those of the last.
+    pub fn middle_tables(&self) -> Tables<'a> {
+        self.tables_at(self.at((self.stretch.start + self.stretch.end) / 2.0) + HAIR_OF_CELL)
+    }
+
+    fn tables_at(&self, at: DVec3) -> Tables<'a> {
+        let cell = || nearest(&self.frame.geometry.grid, at) as usize;
         let label = self.frame.volume.labels().map(|labels| labels[cell()]);
         self.frame.transfer.tables(label)
     }
