@@ -5,7 +5,6 @@ use std::ops::Range;
 
 use glam::{DVec2, DVec3, UVec3};
 
-use super::count::bits;
 use super::queue::{BySlot, NO_SHEET};
 use crate::geometry::slab;
 use crate::geometry::view_geometry::{Perspective, ViewGeometry};
@@ -66,6 +65,8 @@ struct Offsets {
     y: BySlot<f64>,
     depth: BySlot<f64>,
     from_eye: BySlot<f64>,
+    /// In voxels along each axis.
+    voxel: [BySlot<f64>; 3],
 }
 
 /// A frame's projection.
@@ -96,6 +97,7 @@ impl Projection {
             y: std::array::from_fn(|slot| offset(slot).y),
             depth: std::array::from_fn(|slot| offset(slot).depth),
             from_eye: std::array::from_fn(|slot| offset(slot).from_eye),
+            voxel: [0, 1, 2].map(|axis| std::array::from_fn(|slot| brick::in_brick(slot as u32).as_dvec3()[axis])),
         };
         let depths = offsets
             .depth
@@ -117,7 +119,7 @@ impl Projection {
 
     /// Where one of a brick's voxels is.
     pub(super) fn of_voxel(&self, brick: Place, slot: u32) -> Place {
-        let Offsets { x, y, depth, from_eye } = &self.offsets;
+        let Offsets { x, y, depth, from_eye, .. } = &self.offsets;
         let slot = slot as usize;
         brick.plus(Place { x: x[slot], y: y[slot], depth: depth[slot], from_eye: from_eye[slot] })
     }
@@ -203,23 +205,45 @@ impl Projection {
             }
             return first;
         }
-        for (slot, voxel) in brick::voxels(brick) {
-            let sheets = self.sheets(self.of_voxel(place, slot), voxel);
-            if !sheets.is_empty() {
-                first[slot as usize] = sheets.start;
-            }
+        let [starts, ends] = self.in_perspective(brick, place);
+        for (first, (start, end)) in first.iter_mut().zip(starts.into_iter().zip(ends)) {
+            *first = if start < end { start } else { NO_SHEET };
         }
         first
     }
 
-    /// The number of sheets that each of some of a brick's voxels overlaps, by slot; of other slots any number.
+    /// The starts and ends of [`Self::sheets`] of a brick's voxels in perspective, by slot; of empty slots any. Without a branch, so that the loop is
+    /// vectorized.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn sections(&self, brick: &Brick, place: Place, voxels: u64) -> BySlot<u32> {
+    fn in_perspective(&self, brick: &Brick, place: Place) -> [BySlot<i32>; 2] {
+        let mut sheets = [[0; BRICK_VOXELS as usize]; 2];
+        let Some(Perspective { eye, eye_voxel, is_image_aligned, .. }) = self.view.perspective else { return sheets };
+        let (origin, width, by_slab) = (brick::origin(brick).as_dvec3(), self.view.slabs.width, self.view.reach);
+        let Offsets { depth, from_eye, voxel: [x, y, z], .. } = &self.offsets;
+        let [starts, ends] = &mut sheets;
+        for slot in 0..BRICK_VOXELS as usize {
+            let (depth, from_eye) = (place.depth + depth[slot], place.from_eye + from_eye[slot]);
+            let from_voxel = origin + DVec3::new(x[slot], y[slot], z[slot]) - eye_voxel;
+            // The length by the root that is vectorized; the crate's is not.
+            let reach = self.view.radius * from_eye / from_voxel.length_squared().sqrt();
+            let before = if is_image_aligned { reach.min(from_eye - eye.near) } else { by_slab };
+            let behind = if is_image_aligned { reach } else { by_slab };
+            let Range { start, end } = self.numbered(depth - before / width, depth + behind / width);
+            let is_behind_near = from_eye > eye.near;
+            starts[slot] = if is_behind_near { start } else { 0 };
+            ends[slot] = if is_behind_near { end } else { 0 };
+        }
+        sheets
+    }
+
+    /// The number of sheets that each of a brick's voxels overlaps, by slot; of empty slots any number.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn sections(&self, brick: &Brick, place: Place) -> BySlot<u32> {
         let mut sections = [0; BRICK_VOXELS as usize];
         if self.view.perspective.is_some() {
-            for slot in bits(voxels) {
-                let voxel = brick::origin(brick) + brick::in_brick(slot);
-                sections[slot as usize] = self.sheets(self.of_voxel(place, slot), voxel).len() as u32;
+            let [starts, ends] = self.in_perspective(brick, place);
+            for (sections, (start, end)) in sections.iter_mut().zip(starts.into_iter().zip(ends)) {
+                *sections = end.saturating_sub(start).max(0) as u32;
             }
             return sections;
         }

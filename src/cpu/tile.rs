@@ -251,7 +251,7 @@ impl<'a> TileWalk<'a> {
             }
             let sections = simd.vectorize(
                 #[cfg_attr(not(debug_assertions), inline(always))]
-                || frame.projection.sections(&brick, place, marks[0]),
+                || frame.projection.sections(&brick, place),
             );
             let chunk = arrived.chunk.take();
             let drawn = chunk.as_ref().map_or(&frame.drawn, |chunk| &**chunk.drawn());
