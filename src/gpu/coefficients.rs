@@ -83,8 +83,13 @@ impl Coefficients {
     /// # Errors
     /// As for [`Self::texture`].
     pub(crate) fn color_texture(&self, device: &Device, queue: &Queue) -> Result<Option<&TextureView>, RenderError> {
-        let Some(colors) = one_after_the_other(self.colors.iter().map(|colors| &**colors)) else { return Ok(None) };
-        let upload = || scoped(device, || VolumeTexture::upload_color_bits(device, queue, &colors))?;
+        if self.colors.is_empty() {
+            return Ok(None);
+        }
+        let upload = || {
+            let colors = one_after_the_other(self.colors.iter().map(|colors| &**colors)).unwrap_or_default();
+            scoped(device, || VolumeTexture::upload_color_bits(device, queue, &colors))?
+        };
         kept(&self.color_texture, upload).map(Some)
     }
 }

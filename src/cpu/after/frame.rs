@@ -24,9 +24,8 @@ use crate::cpu::frame::{Drawing, Host, Outputs, Tile, draw_tiles};
 use crate::cpu::resolve;
 use crate::cpu::shade::Shader;
 use crate::cpu::sheets::{COLUMNS, ROWS};
-use crate::geometry::view_geometry::ViewGeometry;
-
 use crate::geometry::pixel_ray::counted;
+use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::tile_grid;
