@@ -178,7 +178,7 @@ impl GpuVolume {
         if let Some((_, kept)) = self.kept_coefficients().as_ref().filter(|(of, _)| *of == kernel) {
             return Ok(Arc::clone(kept));
         }
-        let coefficients = Arc::new(Coefficients::of_volume(&self.shared.volume, kernel)?);
+        let coefficients = Coefficients::of_volume(&self.shared.volume, kernel).map(Arc::new)?;
         *self.kept_coefficients() = Some((kernel, Arc::clone(&coefficients)));
         Ok(coefficients)
     }
