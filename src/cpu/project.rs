@@ -161,23 +161,31 @@ impl Projection {
 
     /// The sheets that a voxel's kernel overlaps, in the order in which they are composited; none before the near plane.
     pub(super) fn sheets(&self, place: Place, voxel: UVec3) -> Range<i32> {
-        let by_slab = || {
-            let reach = self.view.reach / self.view.slabs.width;
-            self.numbered(place.depth - reach, place.depth + reach)
-        };
-        let Some(Perspective { eye, eye_voxel, is_image_aligned, .. }) = &self.view.perspective else {
-            return by_slab();
-        };
-        if place.from_eye <= eye.near {
-            return 0..0;
+        match &self.view.perspective {
+            Some(perspective) => self.sheets_of_eye(perspective, (place.depth, place.from_eye), voxel.as_dvec3()),
+            None => {
+                let reach = self.view.reach / self.view.slabs.width;
+                self.numbered(place.depth - reach, place.depth + reach)
+            }
         }
-        if !is_image_aligned {
-            return by_slab();
-        }
-        // (r·w)/λ is the depth over the distance in voxels.
-        let reach = self.view.radius * place.from_eye / (voxel.as_dvec3() - eye_voxel).length();
+    }
+
+    /// The same in perspective, given the voxel's sheet depth in slabs and its depth from the eye. Without a branch, so that loops are vectorized.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn sheets_of_eye(
+        &self,
+        Perspective { eye, eye_voxel, is_image_aligned, .. }: &Perspective,
+        (depth, from_eye): (f64, f64),
+        voxel: DVec3,
+    ) -> Range<i32> {
+        // (r·w)/λ is the depth over the distance in voxels: a length by the root that is vectorized, which the crate's is not.
+        let along_ray = self.view.radius * from_eye / (voxel - eye_voxel).length_squared().sqrt();
+        let before = if *is_image_aligned { along_ray.min(from_eye - eye.near) } else { self.view.reach };
+        let behind = if *is_image_aligned { along_ray } else { self.view.reach };
         let width = self.view.slabs.width;
-        self.numbered(place.depth - reach.min(place.from_eye - eye.near) / width, place.depth + reach / width)
+        let Range { start, end } = self.numbered(depth - before / width, depth + behind / width);
+        let is_behind_near = from_eye > eye.near;
+        if is_behind_near { start..end } else { 0..0 }
     }
 
     /// The first sheets of a brick's voxels by slot, those of empty slots too where that is faster; [`NO_SHEET`] for none.
@@ -212,26 +220,18 @@ impl Projection {
         first
     }
 
-    /// The starts and ends of [`Self::sheets`] of a brick's voxels in perspective, by slot; of empty slots any. Without a branch, so that the loop is
-    /// vectorized.
+    /// The starts and ends of [`Self::sheets`] of a brick's voxels in perspective, by slot; of empty slots any.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn in_perspective(&self, brick: &Brick, place: Place) -> [BySlot<i32>; 2] {
         let mut sheets = [[0; BRICK_VOXELS as usize]; 2];
-        let Some(Perspective { eye, eye_voxel, is_image_aligned, .. }) = self.view.perspective else { return sheets };
-        let (origin, width, by_slab) = (brick::origin(brick).as_dvec3(), self.view.slabs.width, self.view.reach);
+        let Some(perspective) = &self.view.perspective else { return sheets };
+        let origin = brick::origin(brick).as_dvec3();
         let Offsets { depth, from_eye, voxel: [x, y, z], .. } = &self.offsets;
         let [starts, ends] = &mut sheets;
         for slot in 0..BRICK_VOXELS as usize {
-            let (depth, from_eye) = (place.depth + depth[slot], place.from_eye + from_eye[slot]);
-            let from_voxel = origin + DVec3::new(x[slot], y[slot], z[slot]) - eye_voxel;
-            // The length by the root that is vectorized; the crate's is not.
-            let reach = self.view.radius * from_eye / from_voxel.length_squared().sqrt();
-            let before = if is_image_aligned { reach.min(from_eye - eye.near) } else { by_slab };
-            let behind = if is_image_aligned { reach } else { by_slab };
-            let Range { start, end } = self.numbered(depth - before / width, depth + behind / width);
-            let is_behind_near = from_eye > eye.near;
-            starts[slot] = if is_behind_near { start } else { 0 };
-            ends[slot] = if is_behind_near { end } else { 0 };
+            let depths = (place.depth + depth[slot], place.from_eye + from_eye[slot]);
+            let voxel = origin + DVec3::new(x[slot], y[slot], z[slot]);
+            Range { start: starts[slot], end: ends[slot] } = self.sheets_of_eye(perspective, depths, voxel);
         }
         sheets
     }

@@ -52,8 +52,7 @@ impl PixelRay {
     /// The voxel whose cell has the middle of a range of depths; of cells that meet there, the last ([`HAIR_OF_CELL`]).
     pub(crate) fn middle_voxel(&self, depths: &Range<f64>, grid: &Grid) -> UVec3 {
         let at = self.at((depths.start + depths.end) / 2.0) / grid.aspect() + grid.center();
-        // Cast, which rounds towards 0.
-        (at + 0.5 + HAIR_OF_CELL).clamp(DVec3::ZERO, grid.dims.as_dvec3() - 1.0).as_uvec3()
+        grid.nearest(at + HAIR_OF_CELL)
     }
 }
 

@@ -69,7 +69,7 @@ fn refused_tiles(found: String, allowed: &str) -> Option<RenderError> {
     Some(SettingError::new("splatting.rasterizer", format!("\"tiles\" with {found}"), allowed).into())
 }
 
-/// Why tiles do not support some settings, or so many channels with them; `None` if they do.
+/// Why tiles cannot draw with these settings and this number of channels; `None` if they can.
 fn obstacle_in_settings(splatting: &Splatting, channels: usize) -> Option<RenderError> {
     let is_after = splatting.classification == Classification::After;
     if is_after && channels > MOST_LAYERS {

@@ -103,6 +103,12 @@ impl Grid {
         UVec3::new(x, rest % self.dims.y, rest / self.dims.y)
     }
 
+    /// The voxel whose cell has a point in voxel coordinates; beyond all cells, the nearest voxel.
+    pub(crate) fn nearest(&self, at: DVec3) -> UVec3 {
+        // Cast, which rounds towards 0.
+        (at + 0.5).clamp(DVec3::ZERO, self.dims.as_dvec3() - 1.0).as_uvec3()
+    }
+
     /// A voxel's index in memory.
     pub fn index_of(&self, voxel: UVec3) -> u32 {
         voxel.x + self.dims.x * (voxel.y + self.dims.y * voxel.z)

@@ -315,10 +315,7 @@ impl Frame<'_> {
 
     /// The label of the voxel whose cell contains a point of a pixel's ray, given by its position among slabs.
     pub(super) fn label(&self, [x, y]: [usize; 2], lane: usize, slab: f64) -> Option<u16> {
-        let (grid, at) = (&self.grid, self.voxel_at([x + lane, y], slab));
-        let last = grid.dims.as_dvec3() - 1.0;
-        // Cast, which rounds towards 0.
-        self.matter.label(grid.index_of((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3()))
+        self.matter.label(self.grid.index_of(self.grid.nearest(self.voxel_at([x + lane, y], slab))))
     }
 
     /// The label of the voxel whose cell contains the middle of a pixel's stretch: that which parts of an image note (SPEC §11).
