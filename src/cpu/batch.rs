@@ -21,14 +21,6 @@ pub(super) struct Batch<'a> {
     flat_step: f32,
 }
 
-/// The sections of a voxel along its ray, as [`Splat`] holds them.
-#[derive(Default)]
-pub(super) struct AlongRay {
-    end: i32,
-    first_plane: f32,
-    step: f32,
-}
-
 impl Batch<'_> {
     pub(super) fn new(projection: &Projection, amplitude: f64) -> Self {
         let nothing = Err(UVec3::ZERO);
@@ -49,45 +41,37 @@ impl Batch<'_> {
         self.unshaded.set_view(lane, lens.to_eye, f64::from(projection.direction) * lens.per_lambda * amplitude);
     }
 
-    /// The sections of a voxel without perspective.
+    /// The sections of the next voxel without perspective.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn flat(&self, (first_plane, end): (f32, i32)) -> AlongRay {
-        AlongRay { end, first_plane, step: self.flat_step }
+    pub(super) fn flat(&mut self, (first_plane, end): (f32, i32), sheet: i32) {
+        let splat = &mut self.splats[self.count];
+        (splat.first_plane, splat.step, splat.sheets) = (first_plane, self.flat_step, [sheet, end]);
     }
 
-    /// The sections of a voxel in perspective, the next one of the batch.
-    pub(super) fn lens(&mut self, frame: &Frame, place: Place, voxel: UVec3, sheet: i32) -> AlongRay {
+    /// The sections of the next voxel in perspective.
+    pub(super) fn lens(&mut self, frame: &Frame, place: Place, voxel: UVec3, sheet: i32) {
         let projection = &frame.projection;
-        let Some(perspective) = &projection.view.perspective else { return AlongRay::default() };
+        let Some(perspective) = &projection.view.perspective else { return };
         let lens = projection.lens(perspective, place, voxel);
         self.set_view(self.count, projection, &lens, frame.amplitude);
-        self.splats[self.count].local = lens.local.map_or_else(LocalFootprint::default, |local| LocalFootprint {
+        let splat = &mut self.splats[self.count];
+        splat.local = lens.local.map_or_else(LocalFootprint::default, |local| LocalFootprint {
             axis: local.axis.to_array().map(|component| component as f32),
             metric: local.metric.to_array().map(|component| component as f32),
             depth_per_warped: local.depth_per_warped as f32,
             from_eye: place.from_eye as f32,
             cut: local.cut as f32,
         });
-        AlongRay {
-            end: projection.sheets(place, voxel).end,
-            first_plane: ((projection.plane_before(sheet) - place.depth) * lens.per_slab) as f32,
-            step: (f64::from(projection.direction) * lens.per_slab) as f32,
-        }
+        splat.first_plane = ((projection.plane_before(sheet) - place.depth) * lens.per_slab) as f32;
+        splat.step = (f64::from(projection.direction) * lens.per_slab) as f32;
+        splat.sheets = [sheet, projection.sheets(place, voxel).end];
     }
 
-    /// Adds a voxel; in perspective that of the last [`Self::lens`].
+    /// Adds the next voxel, whose sections are set, and whose amount is not known yet.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn add(
-        &mut self,
-        voxel: [u32; 2],
-        sheet: i32,
-        AlongRay { end, first_plane, step }: AlongRay,
-        (center, pixels): ([f32; 2], Pixels),
-    ) {
-        // Its amount is not known yet.
+    pub(super) fn add(&mut self, voxel: [u32; 2], center: [f32; 2], pixels: Pixels) {
         let splat = &mut self.splats[self.count];
-        (splat.center, splat.pixels, splat.sheets) = (center, pixels, [sheet, end]);
-        (splat.first_plane, splat.step) = (first_plane, step);
+        (splat.center, splat.pixels) = (center, pixels);
         (splat.voxel, splat.drawn) = (voxel, 0);
         self.count += 1;
     }

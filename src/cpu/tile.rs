@@ -340,12 +340,12 @@ impl<'a> TileWalk<'a> {
                 }
                 Voxels::Streamed(_) => Err(voxel),
             };
-            let along_ray = match frame.projection.view.perspective {
-                None => batch.flat(frame.projection.flat_sections(place, slot, sheet)),
+            match frame.projection.view.perspective {
+                None => batch.flat(frame.projection.flat_sections(place, slot, sheet), sheet),
                 Some(_) => batch.lens(frame, frame.projection.of_voxel(place, slot), voxel, sheet),
-            };
+            }
             let center = [starts.centers[0][lane], starts.centers[1][lane]];
-            batch.add([arrived, slot], sheet, along_ray, (center, pixels));
+            batch.add([arrived, slot], center, pixels);
             if batch.count == LANES {
                 self.draw_batch(simd, batch);
             }
