@@ -34,8 +34,9 @@ pub(super) fn columns<S: Simd>(simd: S, rows: [&[f32; 4]; LANES]) -> [f32x8<S>; 
     [a.combine(e), b.combine(f), c.combine(g), d.combine(h)]
 }
 
+/// Four rows of four numbers, as four columns.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
+pub(super) fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
     let ([first, last], [second, third]) = ([a.zip_low(c), a.zip_high(c)], [b.zip_low(d), b.zip_high(d)]);
     [first.zip_low(second), first.zip_high(second), last.zip_low(third), last.zip_high(third)]
 }

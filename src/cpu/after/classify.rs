@@ -182,13 +182,11 @@ impl Frame<'_> {
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
-                let cubes = field.cubes(simd, of, [column, row]);
-                for lane in bits(missing.into()) {
-                    let (lane, column) = (lane as usize, column + lane as usize);
-                    let point = (of.0.of(column, row), &of.1);
-                    let gradient = field.gradient(simd, cubes.as_ref(), lane, point, values[column]);
-                    let [x, y, z] = &mut *gradients;
-                    [x[column], y[column], z[column]] = gradient;
+                let mut numbers = [0.0; LANES];
+                numbers.copy_from_slice(&values[column..column + LANES]);
+                let new = field.gradients(simd, of, [column, row], missing, &numbers);
+                for (gradients, new) in gradients.iter_mut().zip(new) {
+                    bits(missing.into()).for_each(|lane| gradients[column + lane as usize] = new[lane as usize]);
                 }
             },
         );

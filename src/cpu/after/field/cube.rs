@@ -7,7 +7,9 @@ use glam::UVec3;
 
 use super::{Cube, Field};
 use crate::cpu::after::differences::{Differences, Neighbours};
-use crate::cpu::vector::{LANES, columns, exp2};
+use crate::cpu::after::planes::Eight;
+use crate::cpu::count::bits;
+use crate::cpu::vector::{LANES, columns, exp2, transposed};
 use crate::volume::{Sample, ValueSlice, for_type};
 
 /// Voxels along a side.
@@ -19,52 +21,65 @@ const OFFSETS: [[f32; SIDE * SIDE]; 2] = [
     [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0],
 ];
 
-/// The kernels around a point: `g = in_plane·along`, cut off at the radius.
-struct Weights<S: Simd> {
-    /// δ along x and y.
-    offsets: [f32x16<S>; 2],
-    squared: f32x16<S>,
-    in_plane: f32x16<S>,
+/// The kernels around eight points: `g = in_plane·along`, cut off at the radius. They are computed for all points before any is used, so that processors
+/// need not wait for one to begin with the next.
+#[repr(align(64))]
+pub(super) struct Weights {
+    in_plane: [[f32; SIDE * SIDE]; LANES],
+    /// The squares of δ along x and y.
+    squared: [[f32; SIDE * SIDE]; LANES],
     /// By z: δ, its Gaussian, and the square of the other components of δ at the kernel's radius.
-    z: [f32; SIDE],
-    along: [f32; SIDE],
-    limit: [f32; SIDE],
+    z: [[f32; SIDE]; LANES],
+    along: [[f32; SIDE]; LANES],
+    limit: [[f32; SIDE]; LANES],
 }
 
-impl<S: Simd> Weights<S> {
+impl Weights {
+    /// Those of the points that have a bit.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn new(simd: S, field: &Field<'_>, [x, y, z]: [f32; 3]) -> Self {
-        let [to_x, to_y] = OFFSETS;
-        let x = f32x16::splat(simd, x) - f32x16::load_array(simd, to_x);
-        let y = f32x16::splat(simd, y) - f32x16::load_array(simd, to_y);
-        let squared = x * x + y * y;
-        let in_plane = gaussian(simd, squared * field.exponent);
-        let z = f32x8::splat(simd, z) - f32x8::load_array(simd, [0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0]);
-        let z_squared = z * z;
-        let first = |vector: f32x8<S>| {
-            let [a, b, c, d, ..] = vector.to_array();
-            [a, b, c, d]
-        };
-        Self {
-            offsets: [x, y],
-            squared,
-            in_plane,
-            z: first(z),
-            along: first(gaussian(simd, z_squared * field.exponent)),
-            limit: first(f32x8::splat(simd, field.radius_squared) - z_squared),
+    pub(super) fn new<S: Simd>(simd: S, field: &Field<'_>, cubes: &Eight, lanes: u32) -> Self {
+        let none = [[0.0; SIDE]; LANES];
+        let in_plane = [[0.0; SIDE * SIDE]; LANES];
+        let mut weights = Self { in_plane, squared: in_plane, z: none, along: none, limit: none };
+        for lane in bits(lanes.into()) {
+            let lane = lane as usize;
+            let [x, y] = offsets(simd, cubes, lane);
+            let squared = x * x + y * y;
+            gaussian(simd, squared * field.exponent).store_array(&mut weights.in_plane[lane]);
+            squared.store_array(&mut weights.squared[lane]);
         }
+        let Self { z, along, limit, .. } = &mut weights;
+        let by_point = z.as_chunks_mut::<SIDE>().0.iter_mut().zip(along.as_chunks_mut::<SIDE>().0).zip(limit.as_chunks_mut::<SIDE>().0);
+        for (((z, along), limit), rest) in by_point.zip(cubes.rest[2].as_chunks::<SIDE>().0) {
+            let [a, b, c, d] = rest.map(|z| f32x4::splat(simd, z));
+            let offset = a.combine(b).combine(c.combine(d)) - f32x16::load_array(simd, OFFSETS[0]);
+            let squared = offset * offset;
+            offset.store_slice(z.as_flattened_mut());
+            gaussian(simd, squared * field.exponent).store_slice(along.as_flattened_mut());
+            (f32x16::splat(simd, field.radius_squared) - squared).store_slice(limit.as_flattened_mut());
+        }
+        weights
     }
 
-    /// g of the voxels of one z.
+    /// g of the voxels of one z around a point.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn at(&self, simd: S, z: usize) -> f32x16<S> {
-        let is_inside = self.squared.simd_lt(f32x16::splat(simd, self.limit[z]));
-        is_inside.select(self.in_plane * self.along[z], f32x16::splat(simd, 0.0))
+    fn at<S: Simd>(&self, simd: S, lane: usize, z: usize) -> f32x16<S> {
+        let squared = f32x16::load_array_ref(simd, &self.squared[lane]);
+        let is_inside = squared.simd_lt(f32x16::splat(simd, self.limit[lane][z]));
+        let in_plane = f32x16::load_array_ref(simd, &self.in_plane[lane]);
+        is_inside.select(in_plane * self.along[lane][z], f32x16::splat(simd, 0.0))
     }
+}
+
+/// δ along x and y of sixteen voxels around one of eight points.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn offsets<S: Simd>(simd: S, Eight { rest, .. }: &Eight, lane: usize) -> [f32x16<S>; 2] {
+    let of = |axis: usize| f32x16::splat(simd, rest[axis][lane]) - f32x16::load_array(simd, OFFSETS[axis]);
+    [of(0), of(1)]
 }
 
 /// The kernels around a point, for each row of voxels along x: `g = along·across`, cut off at the radius.
-struct RowWeights {
+pub(super) struct RowWeights {
     /// The Gaussian of δ along x, and its square.
     along: [f32; SIDE],
     squared: [f32; SIDE],
@@ -74,8 +89,11 @@ struct RowWeights {
 }
 
 impl RowWeights {
+    pub(super) const NONE: Self =
+        Self { along: [0.0; SIDE], squared: [0.0; SIDE], across: [0.0; SIDE * SIDE], limits: [0.0; SIDE * SIDE] };
+
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn new<S: Simd>(simd: S, field: &Field<'_>, [x, y, z]: [f32; 3]) -> Self {
+    pub(super) fn new<S: Simd>(simd: S, field: &Field<'_>, [x, y, z]: [f32; 3]) -> Self {
         /// The voxels of an axis, for each of three axes.
         const VOXELS: [f32; 4 * SIDE] =
             [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0];
@@ -99,16 +117,15 @@ impl RowWeights {
 }
 
 impl Field<'_> {
-    /// N and `Σ (c - base)·g`, each as four numbers to be added. Not finite if a hole is near.
+    /// N and `Σ (c - base)·g` of one of eight points, each as four numbers to be added. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn cube_sums<S: Simd>(&self, simd: S, cube: &Cube) -> [f32x4<S>; 2] {
-        let weights = Weights::new(simd, self, cube.rest);
+    pub(super) fn cube_sums<S: Simd>(&self, simd: S, cubes: &Eight, weights: &Weights, lane: usize) -> [f32x4<S>; 2] {
         let [step_y, step_z] = self.steps();
-        let first = cube.index;
+        let first = cubes.indices[lane] as usize;
         let zero = f32x16::splat(simd, 0.0);
         let (mut total, mut sum) = (zero, zero);
         for z in 0..SIDE {
-            let weight = weights.at(simd, z);
+            let weight = weights.at(simd, lane, z);
             let c = rows(simd, self.coefficients, first + z * step_z, step_y) - self.base;
             total += weight;
             sum += weight * c;
@@ -116,39 +133,35 @@ impl Field<'_> {
         [quarters(total), quarters(sum)]
     }
 
-    /// `Σ d·g / N`. Not finite if a hole is near.
+    /// `2·Σ d·g` of a point, and N. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn cube_differences<S: Simd>(&self, simd: S, cube: &Cube) -> [f32; 3] {
-        let weights = RowWeights::new(simd, self, cube.rest);
-        let [total, x, y, z] = match self.differences {
-            Some(differences) => self.kept_differences(simd, cube, &weights, differences),
-            None => self.new_differences(simd, cube, &weights),
-        };
-        let per_weight = 0.5 * self.scale / total;
-        let [per_x, per_y, per_z] = self.per_spacing;
-        [x * per_weight * per_x, y * per_weight * per_y, z * per_weight * per_z]
+    pub(super) fn cube_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> f32x4<S> {
+        match self.differences {
+            Some(differences) => self.kept_differences(simd, cube, rows, differences),
+            None => self.new_differences(simd, cube, rows),
+        }
     }
 
-    /// N and `2·Σ d·g`, of differences that are kept: x, y and z of a row's four voxels side by side.
+    /// The same of differences that are kept: x, y and z of a row's four voxels side by side.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn kept_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights, kept: &Differences) -> [f32; 4] {
+    fn kept_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights, kept: &Differences) -> f32x4<S> {
         let (along, squared) = (by_difference(simd, rows.along), by_difference(simd, rows.squared));
         let zero = f32x16::splat(simd, 0.0);
         let (mut total, mut sums) = (zero, zero);
-        for (row, index) in self.rows_of(cube).enumerate() {
+        for (row, index) in self.rows_of(cube).into_iter().enumerate() {
             let is_inside = squared.simd_lt(f32x16::splat(simd, rows.limits[row]));
             let weight = is_inside.select(along * rows.across[row], zero);
             total += weight;
             sums += weight * f32x16::from_slice(simd, kept.of_four(index));
         }
-        let (total, sums) = (total.to_array(), sums.to_array());
-        let sum = |of: &[f32; 16], first: usize| (of[first] + of[first + 6]) + (of[first + 3] + of[first + 9]);
-        [sum(&total, 0), sum(&sums, 0), sum(&sums, 1), sum(&sums, 2)]
+        let [x, y, z, _] = of_voxels(simd, sums);
+        let [total, ..] = of_voxels(simd, total);
+        f32x4::load_array(simd, [x, y, z, total])
     }
 
     /// The same sums of the same numbers, where differences are not kept.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn new_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> [f32; 4] {
+    fn new_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> f32x4<S> {
         let (values, dims, [step_y, step_z]) = (self.volume.values(), self.extent.dims, self.steps());
         let is_inside = cube.first.cmpgt(UVec3::ZERO).all() && (cube.first + SIDE as u32).cmplt(dims).all();
         let neighbours = Neighbours::of(values, dims, [1, step_y, step_z]);
@@ -156,7 +169,7 @@ impl Field<'_> {
         let zero = f32x4::splat(simd, 0.0);
         let four = |at: usize| f32x4::load_array(simd, values.run(at));
         let [mut total, mut x, mut y, mut z] = [zero; 4];
-        for (row, index) in self.rows_of(cube).enumerate() {
+        for (row, index) in self.rows_of(cube).into_iter().enumerate() {
             let is_near = squared.simd_lt(f32x4::splat(simd, rows.limits[row]));
             let weight = is_near.select(along * rows.across[row], zero);
             total += weight;
@@ -173,36 +186,46 @@ impl Field<'_> {
                 z += weight * f32x4::load_array(simd, [a[2], b[2], c[2], d[2]]);
             }
         }
-        let sum = |of: f32x4<S>| {
-            let [a, b, c, d] = of.to_array();
-            (a + c) + (b + d)
-        };
-        [sum(total), sum(x), sum(y), sum(z)]
+        let [a, b, c, d] = transposed([x, y, z, total]);
+        (a + c) + (b + d)
     }
 
     /// The indices of the first voxels of a cube's rows along x.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn rows_of(&self, cube: &Cube) -> impl Iterator<Item = usize> {
-        let ([step_y, step_z], first) = (self.steps(), cube.index);
-        (0..SIDE * SIDE).map(move |row| first + row % SIDE * step_y + row / SIDE * step_z)
+    fn rows_of(&self, cube: &Cube) -> [usize; SIDE * SIDE] {
+        let [step_y, step_z] = self.steps();
+        let mut rows = [0; SIDE * SIDE];
+        let mut of_plane = cube.index;
+        for plane in rows.as_chunks_mut::<SIDE>().0 {
+            *plane = [of_plane, of_plane + step_y, of_plane + 2 * step_y, of_plane + 3 * step_y];
+            of_plane += step_z;
+        }
+        rows
     }
 
     /// `Σ (c - f)·g·δ / N`, given f.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn cube_moments<S: Simd>(&self, simd: S, cube: &Cube, number: f32) -> [f32; 3] {
-        let weights = Weights::new(simd, self, cube.rest);
+    pub(super) fn cube_moments<S: Simd>(
+        &self,
+        simd: S,
+        cubes: &Eight,
+        weights: &Weights,
+        lane: usize,
+        number: f32,
+    ) -> [f32; 3] {
         let [step_y, step_z] = self.steps();
-        let first = cube.index;
+        let first = cubes.indices[lane] as usize;
+        let [to_x, to_y] = offsets(simd, cubes, lane);
         let zero = f32x16::splat(simd, 0.0);
         let (mut total, mut x, mut y, mut z) = (zero, zero, zero, zero);
         for plane in 0..SIDE {
-            let weight = weights.at(simd, plane);
+            let weight = weights.at(simd, lane, plane);
             total += weight;
             let c = rows(simd, self.coefficients, first + plane * step_z, step_y) - self.base;
             let weighted = weight * (c * self.scale - number);
-            x += weighted * weights.offsets[0];
-            y += weighted * weights.offsets[1];
-            z += weighted * weights.z[plane];
+            x += weighted * to_x;
+            y += weighted * to_y;
+            z += weighted * weights.z[lane][plane];
         }
         let per_weight = 1.0 / sum_of(total);
         [sum_of(x) * per_weight, sum_of(y) * per_weight, sum_of(z) * per_weight]
@@ -256,6 +279,14 @@ fn side_by_side<T: Sample>(all: &[T], at: usize, step: usize) -> [f32; SIDE * SI
     let [[a, b, c, d], [e, f, g, h]] = [row(at), row(at + step)];
     let [[i, j, k, l], [m, n, o, p]] = [row(at + 2 * step), row(at + 3 * step)];
     [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p].map(T::to_f32)
+}
+
+/// The sums of four voxels' x, y and z, which lie side by side.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn of_voxels<S: Simd>(simd: S, numbers: f32x16<S>) -> [f32; 4] {
+    let numbers = numbers.to_array();
+    let voxel = |at: usize| f32x4::from_slice(simd, &numbers[3 * at..3 * at + 4]);
+    ((voxel(0) + voxel(2)) + (voxel(1) + voxel(3))).to_array()
 }
 
 /// Four sums of four of sixteen numbers each.

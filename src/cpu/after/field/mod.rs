@@ -9,6 +9,7 @@ mod rows;
 
 use std::f64::consts::LOG2_E;
 
+use cube::{RowWeights, Weights};
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::{DVec3, UVec3};
@@ -20,7 +21,7 @@ use super::low_pass::LowPass;
 use super::planes::{Eight, Points};
 use crate::after::normalization::Normalization;
 use crate::cpu::count::bits;
-use crate::cpu::vector::LANES;
+use crate::cpu::vector::{LANES, columns};
 use crate::settings::shading::Gradient;
 use crate::volume::{ValueSlice, Volume};
 
@@ -183,10 +184,11 @@ impl<'a> Field<'a> {
         let mut values = [f32::NAN; LANES];
         let mut left = lanes;
         if let Some(cubes) = self.cubes(simd, of, [column, row]) {
+            let of_cubes = Weights::new(simd, self, &cubes, lanes);
             let (mut weights, mut sums) = ([[0.0; cube::SIDE]; LANES], [[0.0; cube::SIDE]; LANES]);
             for lane in bits(lanes.into()) {
                 let lane = lane as usize;
-                let [weight, sum] = self.cube_sums(simd, &Cube::of(&cubes, lane));
+                let [weight, sum] = self.cube_sums(simd, &cubes, &of_cubes, lane);
                 weight.store_array(&mut weights[lane]);
                 sum.store_array(&mut sums[lane]);
             }
@@ -204,30 +206,77 @@ impl<'a> Field<'a> {
         values
     }
 
-    /// ∇f in numbers per world unit, at a point whose f is `number`.
+    /// ∇f in numbers per world unit, by component, at those of eight points of a plane that have a bit, given their f as numbers.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn gradient<S: Simd>(
+    pub(super) fn gradients<S: Simd>(
         &self,
         simd: S,
-        cubes: Option<&Eight>,
-        lane: usize,
-        (at, low_pass): (DVec3, &LowPass),
-        number: f32,
-    ) -> [f32; 3] {
-        if let Some(cube) = cubes.map(|cubes| Cube::of(cubes, lane)) {
-            let gradient = match self.gradient {
-                Gradient::Differences => self.cube_differences(simd, &cube),
-                Gradient::Kernel => self.kernel_gradient(self.cube_moments(simd, &cube, number)),
+        of: &(Points, LowPass),
+        [column, row]: [usize; 2],
+        lanes: u32,
+        numbers: &[f32; LANES],
+    ) -> [[f32; LANES]; 3] {
+        let mut gradients = [[0.0; LANES]; 3];
+        let mut left = lanes;
+        if let Some(cubes) = self.cubes(simd, of, [column, row]) {
+            gradients = match self.gradient {
+                Gradient::Differences => self.cubes_differences(simd, &cubes, lanes),
+                Gradient::Kernel => self.cubes_moments(simd, &cubes, lanes, numbers),
             };
-            let [x, y, z] = gradient;
-            if (x + y + z).is_finite() {
-                return gradient;
-            }
+            // Where the sum is not finite a hole is near.
+            let [x, y, z] = gradients.each_ref().map(|component| f32x8::load_array_ref(simd, component));
+            let is_finite = (x + y + z).abs().simd_le(f32x8::splat(simd, f32::MAX));
+            left &= !(is_finite.to_bitmask() as u32);
         }
-        match self.gradient {
-            Gradient::Differences => self.row_differences(simd, at, low_pass),
-            Gradient::Kernel => self.kernel_gradient(self.row_moments(simd, at, low_pass, number)),
+        for lane in bits(left.into()) {
+            let lane = lane as usize;
+            let (at, low_pass) = (of.0.of(column + lane, row), &of.1);
+            let gradient = match self.gradient {
+                Gradient::Differences => self.row_differences(simd, at, low_pass),
+                Gradient::Kernel => self.kernel_gradient(self.row_moments(simd, at, low_pass, numbers[lane])),
+            };
+            (0..3).for_each(|axis| gradients[axis][lane] = gradient[axis]);
         }
+        gradients
+    }
+
+    /// `Σ d·g / N` of the points that have a bit.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn cubes_differences<S: Simd>(&self, simd: S, cubes: &Eight, lanes: u32) -> [[f32; LANES]; 3] {
+        let mut weights = [const { RowWeights::NONE }; LANES];
+        for lane in bits(lanes.into()) {
+            let lane = lane as usize;
+            weights[lane] = RowWeights::new(simd, self, Cube::of(cubes, lane).rest);
+        }
+        let mut sums = [[0.0; cube::SIDE]; LANES];
+        for lane in bits(lanes.into()) {
+            let lane = lane as usize;
+            self.cube_differences(simd, &Cube::of(cubes, lane), &weights[lane]).store_array(&mut sums[lane]);
+        }
+        let [x, y, z, total] = columns(simd, sums.each_ref());
+        let per_weight = f32x8::splat(simd, 0.5 * self.scale) / total;
+        let [per_x, per_y, per_z] = self.per_spacing;
+        [x * per_weight * per_x, y * per_weight * per_y, z * per_weight * per_z].map(|of| of.to_array())
+    }
+
+    /// The kernel's gradients of the points that have a bit.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn cubes_moments<S: Simd>(
+        &self,
+        simd: S,
+        cubes: &Eight,
+        lanes: u32,
+        numbers: &[f32; LANES],
+    ) -> [[f32; LANES]; 3] {
+        let weights = Weights::new(simd, self, cubes, lanes);
+        let mut gradients = [[0.0; LANES]; 3];
+        for lane in bits(lanes.into()) {
+            let lane = lane as usize;
+            let moments = self.cube_moments(simd, cubes, &weights, lane, numbers[lane]);
+            let gradient = self.kernel_gradient(moments);
+            (0..3).for_each(|axis| gradients[axis][lane] = gradient[axis]);
+        }
+        gradients
     }
 
     /// The kernel's gradient for `Σ (c - f)·g·δ / N`. Differences from f, because where all coefficients are equal it is then no more than the
@@ -304,10 +353,11 @@ mod tests {
                 let at = points.of(lane, 0);
                 let of = (points, low_pass);
                 let (number, [gradient, kept]) = dispatch!(Level::new(), simd => {
-                    let cubes = ours.cubes(simd, &of, [0, 0]);
-                    let number = ours.values(simd, &of, [0, 0], 1 << lane)[lane];
-                    let gradient = |field: &Field<'_>| field.gradient(simd, cubes.as_ref(), lane, (at, &low_pass), number);
-                    (number, [gradient(&ours), gradient(&keeping)])
+                    let numbers = ours.values(simd, &of, [0, 0], 1 << lane);
+                    let gradient = |field: &Field<'_>| {
+                        field.gradients(simd, &of, [0, 0], 1 << lane, &numbers).map(|component| component[lane])
+                    };
+                    (numbers[lane], [gradient(&ours), gradient(&keeping)])
                 });
                 assert_eq!(kept.map(f32::to_bits), gradient.map(f32::to_bits), "{at} {sets:?}");
                 let value = expected.value(at, &twins);
