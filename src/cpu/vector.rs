@@ -4,7 +4,7 @@
 //! same bits. Polynomials are Chebyshev interpolants, good to the last few bits of an `f32`.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x4, f32x8, u32x8};
+use fearless_simd::{f32x4, f32x8};
 
 /// Numbers in a vector.
 pub(super) const LANES: usize = 8;
@@ -80,14 +80,16 @@ pub(super) fn saturation<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V)
 /// The exponent and `atanh((m - 1) / (m + 1))` of numbers above 0, whose mantissas m are from √½ to √2. `less_one` is the number less 1, more
 /// exactly than the number tells it.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn log_parts<S: Simd>(simd: S, x: f32x8<S>, less_one: f32x8<S>) -> (f32x8<S>, f32x8<S>) {
+fn log_parts<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V, less_one: V) -> (V, V) {
     const ROOT_HALF: u32 = std::f32::consts::FRAC_1_SQRT_2.to_bits();
-    let splat = |bits| u32x8::splat(simd, bits);
+    // The bits of 2²³, in which a whole number's bits are the lowest ones.
+    const WHOLE: u32 = 8_388_608_f32.to_bits();
+    let splat = |bits| V::Bits::splat(simd, bits);
     // The bias makes exponents positive, so that an unsigned shift works.
-    let moved = x.bitcast::<u32x8<S>>() - splat(ROOT_HALF) + splat(128 << MANTISSA);
-    let exponent = (moved >> MANTISSA).bitcast::<fearless_simd::i32x8<S>>().to_float::<f32x8<S>>() - 128.0;
-    let mantissa: f32x8<S> = ((moved & splat((1 << MANTISSA) - 1)) + splat(ROOT_HALF)).bitcast();
-    let is_whole = exponent.simd_eq(f32x8::splat(simd, 0.0));
+    let moved = x.to_bits() - splat(ROOT_HALF) + splat(128 << MANTISSA);
+    let exponent = V::from_bits((moved >> MANTISSA) + splat(WHOLE)) - (8_388_608.0 + 128.0);
+    let mantissa = V::from_bits((moved & splat((1 << MANTISSA) - 1)) + splat(ROOT_HALF));
+    let is_whole = exponent.simd_eq(V::splat(simd, 0.0));
     let above = is_whole.select(less_one, mantissa - 1.0);
     let s = above / (above + 2.0);
     let squared = s * s;
@@ -99,8 +101,8 @@ fn log_parts<S: Simd>(simd: S, x: f32x8<S>, less_one: f32x8<S>) -> (f32x8<S>, f3
 
 /// `-ln(1 - x)` for x from 0 to 0.9999, to full relative precision: the optical depth per unit length for an opacity per unit length.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn optical_depth<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
-    let (exponent, atanh) = log_parts(simd, 1.0 - x, -x);
+pub(super) fn optical_depth<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V {
+    let (exponent, atanh) = log_parts(simd, V::splat(simd, 1.0) - x, -x);
     exponent * -std::f32::consts::LN_2 - atanh * 2.0
 }
 

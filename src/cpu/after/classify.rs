@@ -256,8 +256,8 @@ impl Frame<'_> {
         let at = [looks.origin[0] + column, looks.origin[1] + row];
         let middles = self.labels.then(|| looks.middles(slab.number, [column, row]));
         let label = |lane: usize| middles.and_then(|middles| self.label(at, lane, middles[lane]));
-        let values = slab.values.map(f32x8::to_array);
-        let means = self.integrals.means(simd, slab.lanes, values, |lane| self.integrals.table(label(lane)));
+        let table_of = self.labels.then_some(|lane| self.integrals.table(label(lane)));
+        let means = self.integrals.means(simd, slab.lanes, slab.values, table_of);
         let zero = f32x8::splat(simd, 0.0);
         let visible = slab.lanes & means.amount.simd_gt(zero).to_bitmask() as u32;
         if visible == 0 {

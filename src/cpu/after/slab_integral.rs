@@ -3,11 +3,13 @@
 
 use std::collections::BTreeMap;
 
-use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, f32x16, i32x8};
 
 use crate::after::normalization::Normalization;
 use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
+use super::classify::mask;
+use crate::cpu::count::bits;
 use crate::cpu::vector::{LANES, columns, optical_depth};
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
@@ -16,13 +18,31 @@ use crate::settings::transfer_function::TransferFunction;
 #[derive(Clone, Debug)]
 pub(super) struct Table {
     points: Vec<[f32; 4]>,
-    /// How many of the points are bins.
-    bin_count: usize,
+    /// The first and the last cell that a number of each bin may lie in.
+    bins: Vec<[u32; 2]>,
     cells: Vec<Cell>,
+    range: Range,
+}
+
+/// The numbers of a table.
+#[derive(Clone, Copy, Debug, Default)]
+struct Range {
     /// The min and the max number with an opacity.
     shown: [f32; 2],
-    /// The min number, bins per number, the max number.
-    bins: [f32; 4],
+    /// The min and the max number.
+    all: [f32; 2],
+    bins_per_number: f32,
+    last_bin: f32,
+}
+
+/// The numbers between two planes, by lane.
+struct Between<S: Simd> {
+    low: f32x8<S>,
+    high: f32x8<S>,
+    /// Their bins.
+    bins: [[i32; LANES]; 2],
+    /// The lanes in which a number may have an opacity.
+    lanes: u32,
 }
 
 /// The tables of a transfer function: one for all labels without tables of their own, and one for each other label.
@@ -66,24 +86,52 @@ type Sums<S> = [f32x8<S>; 5];
 
 impl Table {
     fn new(points: Vec<[f32; 4]>) -> Self {
-        let ([cells, bin_count, low, high], bins) = (points[0], points[1]);
-        let bin_count = bin_count as usize;
-        let cells = points[HEAD + bin_count..][..CELL * cells as usize].as_chunks().0.to_vec();
-        Self { bin_count, cells, shown: [low, high], bins, points }
+        let ([cells, bin_count, low, high], [first, bins_per_number, end, _]) = (points[0], points[1]);
+        let cell_points = HEAD + bin_count as usize;
+        let bins = points[HEAD..cell_points].iter().map(|&[first, last, ..]| [first as u32, last as u32]).collect();
+        let cells = points[cell_points..][..CELL * cells as usize].as_chunks().0.to_vec();
+        let range = Range { shown: [low, high], all: [first, end], bins_per_number, last_bin: bin_count - 1.0 };
+        Self { bins, cells, range, points }
     }
 
-    /// The cell of a number in the table's range.
+    /// The cell of a number in the table's range, given its bin.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cell_of(&self, x: f32) -> usize {
-        let [least, per_number, ..] = self.bins;
-        let bin = (((x - least) * per_number) as usize).min(self.bin_count - 1);
-        let [mut first, mut last, ..] = self.points[HEAD + bin].map(|cell| cell as usize);
+    fn cell_of(&self, x: f32, bin: i32) -> usize {
+        let [mut first, mut last] = self.bins[bin as usize].map(|cell| cell as usize);
         while first < last {
             let middle = (first + last).div_ceil(2);
             if self.cells[middle][0][0] <= x { first = middle } else { last = middle - 1 }
         }
         first
     }
+}
+
+impl<S: Simd> Between<S> {
+    /// Those from f0 to f1 in the lanes that have a bit, given their tables, which may all be the same.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn new(simd: S, [f0, f1]: [f32x8<S>; 2], lanes: u32, tables: &[&Table; LANES], are_same: bool) -> Self {
+        let of = |number: fn(&Range) -> f32| match are_same {
+            true => f32x8::splat(simd, number(&tables[0].range)),
+            false => f32x8::load_array(simd, tables.map(|table| number(&table.range))),
+        };
+        let (least, greatest) = (of(|range| range.all[0]), of(|range| range.all[1]));
+        let (x0, x1) = (within(f0, [least, greatest]), within(f1, [least, greatest]));
+        let is_rising = x0.simd_lt(x1);
+        let (low, high) = (is_rising.select(x0, x1), is_rising.select(x1, x0));
+        let is_hidden = high.simd_lt(of(|range| range.shown[0])) | low.simd_gt(of(|range| range.shown[1]));
+        let (per_number, last_bin) = (of(|range| range.bins_per_number), of(|range| range.last_bin));
+        let bins = [low, high].map(|x| {
+            let bin = ((x - least) * per_number).min(last_bin);
+            bin.to_int::<i32x8<S>>().to_array()
+        });
+        Self { low, high, bins, lanes: lanes & !(is_hidden.to_bitmask() as u32) }
+    }
+}
+
+/// Numbers, or the ends of ranges that they lie beyond.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn within<S: Simd>(x: f32x8<S>, [least, greatest]: [f32x8<S>; 2]) -> f32x8<S> {
+    x.simd_lt(least).select(least, x.simd_gt(greatest).select(greatest, x))
 }
 
 impl<'a> Parts<'a> {
@@ -116,10 +164,10 @@ impl Integrals {
         let labels = has_labels.then(|| transfer.labels.keys()).into_iter().flatten();
         let labels: BTreeMap<u16, Table> = labels.map(|&label| (label, table(Some(label)))).collect();
         let plain = table(None);
-        let shown = labels.values().fold(plain.shown, |[low, high], table| {
+        let shown = labels.values().fold(plain.range.shown, |[low, high], table| {
             [
-                if table.shown[0] < low { table.shown[0] } else { low },
-                if table.shown[1] > high { table.shown[1] } else { high },
+                if table.range.shown[0] < low { table.range.shown[0] } else { low },
+                if table.range.shown[1] > high { table.range.shown[1] } else { high },
             ]
         });
         Self { is_optical_depth: compositing == Compositing::Exponential, plain, labels, shown }
@@ -135,42 +183,31 @@ impl Integrals {
     pub(super) fn means<'a, S: Simd>(
         &self,
         simd: S,
-        mut lanes: u32,
-        [f0, f1]: [[f32; LANES]; 2],
-        table_of: impl Fn(usize) -> &'a Table,
+        lanes: u32,
+        [f0, f1]: [f32x8<S>; 2],
+        table_of: Option<impl Fn(usize) -> &'a Table>,
     ) -> Means<S> {
+        let mut tables = [&self.plain; LANES];
+        let are_same = table_of.is_none();
+        if let Some(table_of) = table_of {
+            bits(lanes.into()).for_each(|lane| tables[lane as usize] = table_of(lane as usize));
+        }
+        let between = Between::new(simd, [f0, f1], lanes, &tables, are_same);
+        let size = between.high - between.low;
+        let (lows, highs, sizes) = (between.low.to_array(), between.high.to_array(), size.to_array());
         let (mut near, mut far, mut whole) = (Parts::NONE, Parts::NONE, [[0.0; LANES]; 5]);
-        let (mut lows, mut sizes) = ([0.0; LANES], [0.0; LANES]);
         let mut has_far = false;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize;
-            lanes &= lanes - 1;
-            let table = table_of(lane);
-            let [least, _, greatest, _] = table.bins;
-            let within = |x: f32| {
-                if x < least {
-                    least
-                } else if x > greatest {
-                    greatest
-                } else {
-                    x
-                }
-            };
-            let (x0, x1) = (within(f0[lane]), within(f1[lane]));
-            let (low, high) = if x0 < x1 { (x0, x1) } else { (x1, x0) };
-            if high < table.shown[0] || low > table.shown[1] {
-                continue;
-            }
-            let size = high - low;
-            (lows[lane], sizes[lane]) = (low, size);
-            let first = table.cell_of(low);
+        for lane in bits(between.lanes.into()) {
+            let lane = lane as usize;
+            let (table, low, high, size) = (tables[lane], lows[lane], highs[lane], sizes[lane]);
+            let first = table.cell_of(low, between.bins[0][lane]);
             let cell = &table.cells[first];
             let end = cell[1][3];
             if high < end || first + 1 == table.cells.len() {
                 near.set(lane, cell, [low, high], 1.0);
                 continue;
             }
-            let last = table.cell_of(high);
+            let last = table.cell_of(high, between.bins[1][lane]);
             if last == first {
                 near.set(lane, cell, [low, high], 1.0);
                 continue;
@@ -185,21 +222,22 @@ impl Integrals {
                 whole.iter_mut().zip(sums).for_each(|(lanes, sum)| lanes[lane] = sum / size);
             }
         }
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let is_counted = mask(simd, between.lanes);
+        let (low, size) = (is_counted.select(between.low, zero), is_counted.select(size, zero));
         let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
-        let (low, size) = (load(&lows), load(&sizes));
         let mut sums = self.part(simd, &near, low);
         if has_far {
             let far = self.part(simd, &far, low);
             sums = std::array::from_fn(|at| sums[at] + far[at] + load(&whole[at]));
         }
         let [amount, moment, red, green, blue] = sums;
-        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let has_amount = amount.simd_gt(zero);
         let divisor = has_amount.select(amount, one);
         let is_range = has_amount & size.simd_gt(zero);
         let share = (moment / divisor / is_range.select(size, one)).max(zero).min(one);
         let share = is_range.select(share, f32x8::splat(simd, 0.5));
-        let is_rising = load(&f0).simd_le(load(&f1));
+        let is_rising = f0.simd_le(f1);
         Means {
             amount: has_amount.select(amount, zero),
             share: is_rising.select(share, one - share),
@@ -216,25 +254,31 @@ impl Integrals {
         let [start, per_width, alpha_at_start, rise] = parts.entry(simd, 0);
         let ([red, green, blue, _], [red_rise, green_rise, blue_rise, _]) =
             (parts.entry(simd, 1), parts.entry(simd, 2));
-        let mut sums = [zero; 5];
-        for share in [0.5 - NODE as f32, 0.5 + NODE as f32] {
-            let x = from + (to - from) * share;
-            let u = ((x - start) * per_width).max(zero).min(one);
-            let m = weight * self.amount(simd, alpha_at_start + rise * u);
-            sums[0] += m;
-            sums[1] += m * (x - low);
-            sums[2] += m * (red + red_rise * u);
-            sums[3] += m * (green + green_rise * u);
-            sums[4] += m * (blue + blue_rise * u);
-        }
-        sums
+        // Both nodes at once.
+        let twice = |of: f32x8<S>| of.combine(of);
+        let share = f32x8::splat(simd, 0.5 - NODE as f32).combine(f32x8::splat(simd, 0.5 + NODE as f32));
+        let x = twice(from) + twice(to - from) * share;
+        let u = ((x - twice(start)) * twice(per_width)).max(twice(zero)).min(twice(one));
+        let m = twice(weight) * self.amount(simd, twice(alpha_at_start) + twice(rise) * u);
+        let sum = |of: f32x16<S>| {
+            let (first, second) = of.split();
+            first + second
+        };
+        let of_color = |at_start: f32x8<S>, rise: f32x8<S>| sum(m * (twice(at_start) + twice(rise) * u));
+        [
+            sum(m),
+            sum(m * (x - twice(low))),
+            of_color(red, red_rise),
+            of_color(green, green_rise),
+            of_color(blue, blue_rise),
+        ]
     }
 
     /// m of SPEC §5.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn amount<S: Simd>(&self, simd: S, alpha: f32x8<S>) -> f32x8<S> {
+    fn amount<S: Simd>(&self, simd: S, alpha: f32x16<S>) -> f32x16<S> {
         match self.is_optical_depth {
-            true => optical_depth(simd, alpha.min(f32x8::splat(simd, 0.9999))),
+            true => optical_depth(simd, alpha.min(f32x16::splat(simd, 0.9999))),
             false => alpha,
         }
     }
@@ -244,7 +288,7 @@ impl Table {
     /// The sums over whole cells, from one to another, moments from a number.
     fn between(&self, first: usize, last: usize, low: f32) -> [f32; 5] {
         let level = (first ^ last).max(1).ilog2() as usize;
-        let sums = HEAD + self.bin_count + self.cells.len() * (CELL + SUM * level);
+        let sums = HEAD + self.bins.len() + self.cells.len() * (CELL + SUM * level);
         let mut total = [0.0; 5];
         for cell in [first, last].into_iter().take(if first == last { 1 } else { 2 }) {
             let [m, moment, middle, _] = self.points[sums + SUM * cell];
