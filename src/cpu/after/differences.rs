@@ -8,9 +8,14 @@ use crate::volume::{ValueSlice, Volume};
 /// The maximum number of voxels of a volume of which differences are kept, which then take 192 MiB, and values as `f32`, which take 64 MiB.
 pub(super) const MAX_VOXELS: u64 = 1 << 24;
 
-/// `2·d` times the spacing, along x, y and z, for all voxels in memory order; d is the estimate of the gradient by differences. NaN beside a hole.
+/// `2·d` times the spacing, along x, y and z, for all voxels in memory order; d is the estimate of the gradient by differences. Of whole numbers they are whole
+/// numbers, which take half the memory if they are small.
 #[derive(Clone, Debug)]
-pub(super) struct Differences(Vec<f32>);
+pub(super) enum Differences {
+    Small(Vec<i16>),
+    /// NaN beside a hole.
+    Any(Vec<f32>),
+}
 
 impl Differences {
     /// Numbers behind the last voxel's, so that those of four voxels can be read as a vector of sixteen.
@@ -18,30 +23,42 @@ impl Differences {
 
     /// `None` if the volume is too large.
     pub(super) fn new(volume: &Volume) -> Option<Self> {
-        let dims = volume.dims();
-        if dims.as_u64vec3().element_product() > MAX_VOXELS {
+        if volume.dims().as_u64vec3().element_product() > MAX_VOXELS {
             return None;
         }
-        let (nx, ny) = (dims.x as usize, dims.y as usize);
-        let count = 3 * volume.values().len();
-        let mut all = vec![0.0; count + Self::PADDING];
-        all[..count].par_chunks_mut(3 * nx * ny).zip(0..dims.z).for_each(|(plane, z)| {
-            for (row, y) in plane.chunks_mut(3 * nx).zip(0..) {
-                let neighbours = Neighbours::of(volume.values(), dims, [1, nx, nx * ny]);
-                let first = nx * (y as usize + ny * z as usize);
-                for (of_voxel, x) in row.as_chunks_mut().0.iter_mut().zip(0..) {
-                    *of_voxel = neighbours.at(first + x as usize, UVec3::new(x, y, z));
-                }
-            }
-        });
-        Some(Self(all))
+        Some(match are_small(volume.values()) {
+            // A cast, which keeps whole numbers in this range.
+            true => Self::Small(differences(volume, |difference| difference as i16)),
+            false => Self::Any(differences(volume, |difference| difference)),
+        })
     }
+}
 
-    /// Those of four voxels along x, given the index of the first one, and four numbers more.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn of_four(&self, index: usize) -> &[f32] {
-        &self.0[3 * index..3 * index + 16]
+/// Whether differences of any two values, twice, are whole numbers that fit in 16 bits.
+fn are_small(values: ValueSlice<'_>) -> bool {
+    if matches!(values, ValueSlice::F32(_)) {
+        return false;
     }
+    let (least, greatest) = values.iter().fold((f32::MAX, f32::MIN), |(a, b), value| (a.min(value), b.max(value)));
+    2.0 * (greatest - least) <= f32::from(i16::MAX)
+}
+
+/// The differences of all voxels, and some zeros.
+fn differences<T: Copy + Default + Send>(volume: &Volume, of: impl Fn(f32) -> T + Sync) -> Vec<T> {
+    let dims = volume.dims();
+    let (nx, ny) = (dims.x as usize, dims.y as usize);
+    let count = 3 * volume.values().len();
+    let mut all = vec![T::default(); count + Differences::PADDING];
+    all[..count].par_chunks_mut(3 * nx * ny).zip(0..dims.z).for_each(|(plane, z)| {
+        for (row, y) in plane.chunks_mut(3 * nx).zip(0..) {
+            let neighbours = Neighbours::of(volume.values(), dims, [1, nx, nx * ny]);
+            let first = nx * (y as usize + ny * z as usize);
+            for (of_voxel, x) in row.as_chunks_mut().0.iter_mut().zip(0..) {
+                *of_voxel = neighbours.at(first + x as usize, UVec3::new(x, y, z)).map(&of);
+            }
+        }
+    });
+    all
 }
 
 /// A volume's values, its voxels along each axis, and the steps in memory along each.

@@ -137,14 +137,15 @@ impl Field<'_> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn cube_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> f32x4<S> {
         match self.differences {
-            Some(differences) => self.kept_differences(simd, cube, rows, differences),
+            Some(Differences::Small(all)) => self.kept_differences(simd, cube, rows, all),
+            Some(Differences::Any(all)) => self.kept_differences(simd, cube, rows, all),
             None => self.new_differences(simd, cube, rows),
         }
     }
 
     /// The same of differences that are kept: x, y and z of a row's four voxels side by side.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn kept_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights, kept: &Differences) -> f32x4<S> {
+    fn kept_differences<S: Simd, T: Sample>(&self, simd: S, cube: &Cube, rows: &RowWeights, all: &[T]) -> f32x4<S> {
         let (along, squared) = (by_difference(simd, rows.along), by_difference(simd, rows.squared));
         let zero = f32x16::splat(simd, 0.0);
         let (mut total, mut sums) = (zero, zero);
@@ -152,7 +153,7 @@ impl Field<'_> {
             let is_inside = squared.simd_lt(f32x16::splat(simd, rows.limits[row]));
             let weight = is_inside.select(along * rows.across[row], zero);
             total += weight;
-            sums += weight * f32x16::from_slice(simd, kept.of_four(index));
+            sums += weight * four_differences(simd, all, index);
         }
         let [x, y, z, _] = of_voxels(simd, sums);
         let [total, ..] = of_voxels(simd, total);
@@ -255,6 +256,14 @@ fn by_difference<S: Simd>(simd: S, of_voxels: [f32; SIDE]) -> f32x16<S> {
     let four = f32x4::load_array(simd, of_voxels);
     let eight = four.combine(four);
     eight.combine(eight).swizzle_dyn_within_blocks(u8x64::load_array_ref(simd, &BYTES))
+}
+
+/// The differences of four voxels along x, given the index of the first one, and four numbers more.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn four_differences<S: Simd, T: Sample>(simd: S, all: &[T], index: usize) -> f32x16<S> {
+    let mut numbers = [0.0; 16];
+    numbers.iter_mut().zip(&all[3 * index..3 * index + 16]).for_each(|(number, difference)| *number = difference.to_f32());
+    f32x16::load_array(simd, numbers)
 }
 
 /// The Gaussian by its exponent of 2.
