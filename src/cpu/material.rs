@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicIsize, Ordering};
 
 use glam::{DVec3, DVec4, UVec3};
 
+use super::count::bits;
 use crate::lists::brick;
 use crate::lists::brick::{BRICK_VOXELS, Brick};
 use crate::settings::shading::MIN_GRADIENT;
@@ -49,6 +50,14 @@ impl Materials {
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn of_slot<'a>(&self, brick: &'a BrickMaterials, slot: u32) -> &'a [Material] {
         &brick[slot as usize * self.channels..][..self.channels]
+    }
+
+    /// Reads the materials of a brick that will be drawn, if they are known, so that they are in the cache when its voxels' sheets come.
+    pub(super) fn approach(&self, number: u32, brick: &Brick) {
+        if let Some(materials) = self.bricks[number as usize].get() {
+            let read = |slot: u32| materials[slot as usize * self.channels].alpha.to_bits();
+            std::hint::black_box(bits(brick::present(brick)).fold(0, |all, slot| all | read(slot)));
+        }
     }
 
     /// The materials of a brick, given by its number; `None` if they are not kept.

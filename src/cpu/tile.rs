@@ -272,6 +272,9 @@ impl<'a> TileWalk<'a> {
             (Voxels::Streamed(_), None) => return false,
         };
         let place = projection.of_brick(&brick);
+        if let Voxels::Whole { materials, .. } = voxels {
+            materials.approach(placed.brick, &brick);
+        }
         let number = self.arrived.len() as u32;
         let Placed { half_box, end, .. } = *placed;
         self.arrived.push(Arrived { chunk: chunk.cloned(), number: placed.brick, brick, place, half_box, end });
