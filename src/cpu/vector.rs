@@ -169,6 +169,7 @@ mod tests {
         for (low, high) in [(1e-30, 1e-20), (1e-9, 1e-3), (1e-3, 3.0), (1.0, 1000.0)] {
             assert!(worst(low, high, of, |x| -(-x).exp_m1() / x) < 3e-7, "{low} {high}");
         }
+        assert_eq!(of([0.0; LANES]), [1.0; LANES]);
         let of = |x: [f32; LANES]| dispatch!(level, simd => optical_depth(simd, f32x8::load_array(simd, x)).to_array());
         for (low, high) in [(1e-30, 1e-20), (1e-9, 1e-3), (1e-3, 0.4), (0.2, 0.9999)] {
             assert!(worst(low, high, of, |x| -(-x).ln_1p()) < 4e-7, "{low} {high}");

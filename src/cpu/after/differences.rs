@@ -5,7 +5,7 @@ use glam::UVec3;
 use crate::parallel::prelude::*;
 use crate::volume::{ValueSlice, Volume};
 
-/// The maximum number of voxels of a volume of which differences are kept, which then take 192 MiB, and values as `f32`, which take 64 MiB.
+/// The maximum number of voxels of a volume of which differences are kept, which then take 192 MiB at the most, and values as `f32`, which take 64 MiB.
 pub(super) const MAX_VOXELS: u64 = 1 << 24;
 
 /// `2·d` times the spacing, along x, y and z, for all voxels in memory order; d is the estimate of the gradient by differences. Of whole numbers they are whole

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, f32x16, i32x8};
 
+use super::classify::mask;
 use crate::after::normalization::Normalization;
 use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
-use super::classify::mask;
 use crate::cpu::count::bits;
 use crate::cpu::vector::{LANES, columns, optical_depth};
 use crate::settings::splatting::Compositing;
@@ -121,17 +121,18 @@ impl<S: Simd> Between<S> {
         let is_hidden = high.simd_lt(of(|range| range.shown[0])) | low.simd_gt(of(|range| range.shown[1]));
         let (per_number, last_bin) = (of(|range| range.bins_per_number), of(|range| range.last_bin));
         let bins = [low, high].map(|x| {
-            let bin = ((x - least) * per_number).min(last_bin);
+            let bin = within((x - least) * per_number, [f32x8::splat(simd, 0.0), last_bin]);
             bin.to_int::<i32x8<S>>().to_array()
         });
         Self { low, high, bins, lanes: lanes & !(is_hidden.to_bitmask() as u32) }
     }
 }
 
-/// Numbers, or the ends of ranges that they lie beyond.
+/// Numbers, or the ends of ranges that they lie beyond; the least of a range instead of NaN.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn within<S: Simd>(x: f32x8<S>, [least, greatest]: [f32x8<S>; 2]) -> f32x8<S> {
-    x.simd_lt(least).select(least, x.simd_gt(greatest).select(greatest, x))
+    let at_least = x.simd_gt(least).select(x, least);
+    at_least.simd_gt(greatest).select(greatest, at_least)
 }
 
 impl<'a> Parts<'a> {

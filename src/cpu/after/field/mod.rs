@@ -261,13 +261,7 @@ impl<'a> Field<'a> {
 
     /// The kernel's gradients of the points that have a bit.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cubes_moments<S: Simd>(
-        &self,
-        simd: S,
-        cubes: &Eight,
-        lanes: u32,
-        numbers: &[f32; LANES],
-    ) -> [[f32; LANES]; 3] {
+    fn cubes_moments<S: Simd>(&self, simd: S, cubes: &Eight, lanes: u32, numbers: &[f32; LANES]) -> [[f32; LANES]; 3] {
         let weights = Weights::new(simd, self, cubes, lanes);
         let mut gradients = [[0.0; LANES]; 3];
         for lane in bits(lanes.into()) {
@@ -310,7 +304,7 @@ mod tests {
     use crate::reference::after as twin;
     use crate::scene::{Scene, VolumeSource};
     use crate::settings::splatting::Interpolation;
-    use crate::volume::SampleType;
+    use crate::volume::{SampleType, Values};
 
     /// Numbers from 0 to 1.
     fn random(state: &mut u64) -> f64 {
@@ -402,6 +396,26 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    /// Differences of whole numbers are kept as such where they fit in 16 bits, twice.
+    #[test]
+    fn the_field_of_whole_numbers_is_that_of_the_f64_evaluation() {
+        let mut state = 3;
+        let dims = UVec3::new(12, 9, 11);
+        for (greatest, is_small) in [(16_383_u16, true), (16_384, false)] {
+            // Neighbours that are as far apart as they can be, too.
+            let mut value = || match random(&mut state) {
+                extreme if extreme < 0.4 => greatest * u16::from(extreme < 0.2),
+                number => (number * f64::from(greatest)) as u16,
+            };
+            let values: Vec<u16> = (0..dims.element_product()).map(|_| value()).collect();
+            let volume = Volume::from_values("random", dims, DVec3::new(1.0, 0.5, 2.0), Values::U16(values)).unwrap();
+            assert_eq!(matches!(Differences::new(&volume), Some(Differences::Small(_))), is_small);
+            let (values, gradients, count) = worst(&volume, &["shading.gradient=differences"], &mut state);
+            assert!(values < 3e-6 && gradients < 2e-5, "{values} {gradients}");
+            assert!(count > 500, "only {count} points have values");
         }
     }
 
