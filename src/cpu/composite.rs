@@ -1,7 +1,7 @@
 //! Compositing of one sheet of a tile, eq. 2 and SPEC §5; the same as `shaders/composite.wgsl`.
 
+use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x8, f32x16};
 
 use super::cull::OpenMask;
 use super::cut::TileRays;
@@ -10,11 +10,8 @@ use super::vector::{LANES, saturation};
 use crate::lists::quad_plan::TILE;
 use crate::settings::splatting::{Compositing, Order};
 
-/// Pixels of a row that are composited together: two of a sheet's vectors, so that the widest instruction set's are filled.
-const WIDE: usize = 2 * LANES;
-
-/// Red, green, blue and opacity of those pixels.
-type Pixels<S> = [f32x16<S>; CHANNELS];
+/// Red, green, blue and opacity of eight pixels.
+type Pixels<S> = [f32x8<S>; CHANNELS];
 
 /// The rule by which sheets are composited into the compositing buffer.
 #[derive(Clone, Copy, Debug)]
@@ -54,14 +51,13 @@ impl Compositor {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
             let mut opaque = 0;
-            for first in (0..VECTORS).step_by(WIDE / LANES) {
-                let halves = [sheet.take(simd, row, first), sheet.take(simd, row, first + 1)];
-                if halves.iter().all(Option::is_none) && !has_empty {
-                    continue;
-                }
-                let [low, high] = halves.map(|half| half.unwrap_or([f32x8::splat(simd, 0.0); CHANNELS]));
-                let pixels = std::array::from_fn(|channel| low[channel].combine(high[channel]));
-                opaque |= self.vector(simd, pixels, buffers, (rays, begin), [row, first * LANES]);
+            for vector in 0..VECTORS {
+                let pixels = match sheet.take(simd, row, vector) {
+                    Some(pixels) => pixels,
+                    None if has_empty => [f32x8::splat(simd, 0.0); CHANNELS],
+                    None => continue,
+                };
+                opaque |= self.vector(simd, pixels, buffers, (rays, begin), [row, vector * LANES]);
             }
             let opaque = opaque & open.row(row);
             if opaque != 0 {
@@ -75,7 +71,7 @@ impl Compositor {
         tiles
     }
 
-    /// Composites pixels of a row, from a column on. Returns which of the row's pixels are now opaque, as bits; 0 if nothing is culled.
+    /// Composites eight pixels of a row, from a column on. Returns which of the row's pixels are now opaque, as bits; 0 if nothing is culled.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn vector<S: Simd>(
         &self,
@@ -85,8 +81,8 @@ impl Compositor {
         (rays, begin): (&TileRays, f32),
         [row, at]: [usize; 2],
     ) -> u32 {
-        let splat = |number: f32| f32x16::splat(simd, number);
-        let load = |row: &[f32; COLUMNS]| f32x16::from_slice(simd, &row[at..at + WIDE]);
+        let splat = |number: f32| f32x8::splat(simd, number);
+        let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[at..at + LANES]);
         let mut stretch = [splat(f32::NEG_INFINITY), splat(f32::INFINITY)];
         let mut closed = 0;
         if let Some(shown) = &rays.shown {
@@ -109,22 +105,22 @@ impl Compositor {
             after = std::array::from_fn(|channel| counts.select(after[channel], before[channel]));
         }
         for (channel, after) in acc.iter_mut().zip(after) {
-            after.store_slice(&mut channel[at..at + WIDE]);
+            after.store_slice(&mut channel[at..at + LANES]);
         }
         if self.first_hit.is_some() {
             let hits = &mut buffers.hits[row];
             let opacities = [before[3], pixels[3], after[3]];
             let hit = self.hit(simd, load(hits), opacities, stretch, begin);
-            hit.store_slice(&mut hits[at..at + WIDE]);
+            hit.store_slice(&mut hits[at..at + LANES]);
         }
         self.threshold.map_or(0, |threshold| (after[3].simd_ge(splat(threshold)).to_bitmask() as u32 | closed) << at)
     }
 
-    /// Composites pixels. By means ([`Compositing`]): for the minimum the compositing buffer keeps 2 less the opacity, and 0 where
+    /// Composites eight pixels. By means ([`Compositing`]): for the minimum the compositing buffer keeps 2 less the opacity, and 0 where
     /// nothing counted; for a surface that is not reached the mean of the last sheet.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn pixels<S: Simd>(&self, simd: S, acc: Pixels<S>, sheet: Pixels<S>) -> Pixels<S> {
-        let (zero, one) = (f32x16::splat(simd, 0.0), f32x16::splat(simd, 1.0));
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let sheet = match self.compositing {
             Compositing::Linear => scaled(sheet, one / sheet[3].max(one)),
             Compositing::Exponential => scaled(sheet, saturation(simd, sheet[3])),
@@ -134,7 +130,7 @@ impl Compositor {
             (Compositing::Xray | Compositing::Average, _) => sum(acc, sheet),
             (Compositing::Maximum, _) => self.kept(acc, sheet, sheet[3].min(one), one),
             (Compositing::Minimum, _) => {
-                let opacity = f32x16::splat(simd, 2.0) - sheet[3].min(one);
+                let opacity = f32x8::splat(simd, 2.0) - sheet[3].min(one);
                 self.kept(acc, sheet, opacity, one)
             }
             (Compositing::Surface, _) => {
@@ -142,7 +138,7 @@ impl Compositor {
                 let there: Pixels<S> =
                     std::array::from_fn(|channel| acc[channel] + (sheet[channel] - acc[channel]) * share);
                 let reached = [there[0] / there[3], there[1] / there[3], there[2] / there[3], one];
-                let (is_reached, is_below) = (acc[3].simd_ge(one), sheet[3].simd_lt(f32x16::splat(simd, 0.5)));
+                let (is_reached, is_below) = (acc[3].simd_ge(one), sheet[3].simd_lt(f32x8::splat(simd, 0.5)));
                 let now = |channel: usize| is_below.select(sheet[channel], reached[channel]);
                 std::array::from_fn(|channel| is_reached.select(acc[channel], now(channel)))
             }
@@ -154,7 +150,7 @@ impl Compositor {
 
     /// Keeps a sheet where its opacity is larger, or equal and nearer. Opacities above 1 count as equal.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn kept<S: Simd>(&self, acc: Pixels<S>, sheet: Pixels<S>, opacity: f32x16<S>, one: f32x16<S>) -> Pixels<S> {
+    fn kept<S: Simd>(&self, acc: Pixels<S>, sheet: Pixels<S>, opacity: f32x8<S>, one: f32x8<S>) -> Pixels<S> {
         let passes = match self.order {
             Order::FrontToBack => opacity.simd_gt(acc[3]),
             Order::BackToFront => opacity.simd_ge(acc[3]),
@@ -169,13 +165,13 @@ impl Compositor {
     fn hit<S: Simd>(
         &self,
         simd: S,
-        hit: f32x16<S>,
-        [before, sheet, after]: [f32x16<S>; 3],
-        stretch: [f32x16<S>; 2],
+        hit: f32x8<S>,
+        [before, sheet, after]: [f32x8<S>; 3],
+        stretch: [f32x8<S>; 2],
         begin: f32,
-    ) -> f32x16<S> {
+    ) -> f32x8<S> {
         let is_surface = self.compositing == Compositing::Surface;
-        let opacity = f32x16::splat(simd, if is_surface { 1.0 } else { self.first_hit.unwrap_or(1.0) });
+        let opacity = f32x8::splat(simd, if is_surface { 1.0 } else { self.first_hit.unwrap_or(1.0) });
         let is_here = before.simd_lt(opacity) & after.simd_ge(opacity);
         let at = if is_surface {
             // Counted from the middle of the previous slab.
@@ -196,18 +192,18 @@ fn tiles_of(rows: u64) -> u64 {
 
 /// The length of the part of a stretch that lies in the slab beginning at `begin`.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn within_slab<S: Simd>(simd: S, [start, end]: [f32x16<S>; 2], begin: f32) -> [f32x16<S>; 2] {
-    [start.max(f32x16::splat(simd, begin)), end.min(f32x16::splat(simd, begin + 1.0))]
+fn within_slab<S: Simd>(simd: S, [start, end]: [f32x8<S>; 2], begin: f32) -> [f32x8<S>; 2] {
+    [start.max(f32x8::splat(simd, begin)), end.min(f32x8::splat(simd, begin + 1.0))]
 }
 
 /// Where between the middles of a slab and of the next one their means' opacity is one half, if it grows evenly.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn crossing<S: Simd>(before: f32x16<S>, mean: f32x16<S>) -> f32x16<S> {
+fn crossing<S: Simd>(before: f32x8<S>, mean: f32x8<S>) -> f32x8<S> {
     (0.5 - before) / (mean - before)
 }
 
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn scaled<S: Simd>([red, green, blue, alpha]: Pixels<S>, by: f32x16<S>) -> Pixels<S> {
+fn scaled<S: Simd>([red, green, blue, alpha]: Pixels<S>, by: f32x8<S>) -> Pixels<S> {
     [red * by, green * by, blue * by, alpha * by]
 }
 

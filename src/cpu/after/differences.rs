@@ -12,6 +12,8 @@ pub(super) const MAX_VOXELS: u64 = 1 << 24;
 /// numbers, which take half the memory if they are small.
 #[derive(Clone, Debug)]
 pub(super) enum Differences {
+    /// As [`ValueSlice`] does, a page has one type, so that it stays short.
+    #[cfg(not(target_arch = "wasm32"))]
     Small(Vec<i16>),
     /// NaN beside a hole.
     Any(Vec<f32>),
@@ -26,15 +28,17 @@ impl Differences {
         if volume.dims().as_u64vec3().element_product() > MAX_VOXELS {
             return None;
         }
-        Some(match are_small(volume.values()) {
+        #[cfg(not(target_arch = "wasm32"))]
+        if are_small(volume.values()) {
             // A cast, which keeps whole numbers in this range.
-            true => Self::Small(differences(volume, |difference| difference as i16)),
-            false => Self::Any(differences(volume, |difference| difference)),
-        })
+            return Some(Self::Small(differences(volume, |difference| difference as i16)));
+        }
+        Some(Self::Any(differences(volume, |difference| difference)))
     }
 }
 
 /// Whether differences of any two values, twice, are whole numbers that fit in 16 bits.
+#[cfg(not(target_arch = "wasm32"))]
 fn are_small(values: ValueSlice<'_>) -> bool {
     if matches!(values, ValueSlice::F32(_)) {
         return false;

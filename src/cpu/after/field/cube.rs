@@ -137,6 +137,7 @@ impl Field<'_> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn cube_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> f32x4<S> {
         match self.differences {
+            #[cfg(not(target_arch = "wasm32"))]
             Some(Differences::Small(all)) => self.kept_differences(simd, cube, rows, all),
             Some(Differences::Any(all)) => self.kept_differences(simd, cube, rows, all),
             None => self.new_differences(simd, cube, rows),
