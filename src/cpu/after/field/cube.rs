@@ -48,15 +48,17 @@ impl Weights {
             gaussian(simd, squared * field.exponent).store_array(&mut weights.in_plane[lane]);
             squared.store_array(&mut weights.squared[lane]);
         }
+        let Self { z, along, limit, .. } = &mut weights;
         // Four points at a time.
-        for first in (0..LANES).step_by(SIDE) {
-            let [a, b, c, d] = [0, 1, 2, 3].map(|point| f32x4::splat(simd, cubes.rest[2][first + point]));
-            let z = a.combine(b).combine(c.combine(d)) - f32x16::load_array(simd, OFFSETS[0]);
-            let squared = z * z;
-            let four = first..first + SIDE;
-            z.store_slice(weights.z[four.clone()].as_flattened_mut());
-            gaussian(simd, squared * field.exponent).store_slice(weights.along[four.clone()].as_flattened_mut());
-            (f32x16::splat(simd, field.radius_squared) - squared).store_slice(weights.limit[four].as_flattened_mut());
+        let z = z.as_chunks_mut::<SIDE>().0.iter_mut();
+        let by_four = z.zip(along.as_chunks_mut::<SIDE>().0).zip(limit.as_chunks_mut::<SIDE>().0);
+        for (((z, along), limit), rest) in by_four.zip(cubes.rest[2].as_chunks::<SIDE>().0) {
+            let [a, b, c, d] = rest.map(|z| f32x4::splat(simd, z));
+            let offset = a.combine(b).combine(c.combine(d)) - f32x16::load_array(simd, OFFSETS[0]);
+            let squared = offset * offset;
+            offset.store_slice(z.as_flattened_mut());
+            gaussian(simd, squared * field.exponent).store_slice(along.as_flattened_mut());
+            (f32x16::splat(simd, field.radius_squared) - squared).store_slice(limit.as_flattened_mut());
         }
         weights
     }
