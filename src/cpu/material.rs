@@ -52,8 +52,9 @@ impl Materials {
         &brick[slot as usize * self.channels..][..self.channels]
     }
 
-    /// Reads the materials of a brick that will be drawn, if they are known, so that they are in the cache when its voxels' sheets come.
-    pub(super) fn approach(&self, number: u32, brick: &Brick) {
+    /// Reads the materials of a brick that will be drawn, if they are known: what is read counts for nothing, but is in the cache when the sheets of the brick's
+    /// voxels come.
+    pub(super) fn read_ahead(&self, number: u32, brick: &Brick) {
         if let Some(materials) = self.bricks[number as usize].get() {
             let read = |slot: u32| materials[slot as usize * self.channels].alpha.to_bits();
             std::hint::black_box(bits(brick::present(brick)).fold(0, |all, slot| all | read(slot)));

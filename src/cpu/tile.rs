@@ -273,7 +273,7 @@ impl<'a> TileWalk<'a> {
         };
         let place = projection.of_brick(&brick);
         if let Voxels::Whole { materials, .. } = voxels {
-            materials.approach(placed.brick, &brick);
+            materials.read_ahead(placed.brick, &brick);
         }
         let number = self.arrived.len() as u32;
         let Placed { half_box, end, .. } = *placed;

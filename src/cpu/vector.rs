@@ -63,18 +63,18 @@ pub(super) fn exp2<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V 
     power + power * less_one
 }
 
-/// The least exponent of powers of two whose products with polynomials are normal numbers: processors take a hundred cycles for others. What is smaller
-/// counts for nothing beside a number of magnitude 1.
+/// The least exponent of 2 for which powers are computed: their products with polynomials are normal numbers. Processors take many times as long for
+/// smaller, subnormal numbers, and these would be rounded away beside a number of magnitude 1.
 const LEAST_EXPONENT: f32 = -100.0;
 
 /// `(1 - exp(-x)) / x`, 1 at 0, for x from 0 on; to full relative precision.
 #[cfg_attr(not(debug_assertions), inline(always))]
-pub(super) fn saturation<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V {
-    // Squares of this are normal numbers, too.
-    let x = x.max(V::splat(simd, 1e-15));
-    let exponent = (x * -std::f32::consts::LOG2_E).max(V::splat(simd, LEAST_EXPONENT));
+pub(super) fn saturation<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
+    // The square of this is a normal number, too.
+    let x = x.max(f32x8::splat(simd, 1e-15));
+    let exponent = (x * -std::f32::consts::LOG2_E).max(f32x8::splat(simd, LEAST_EXPONENT));
     let (power, less_one) = exp2_parts(simd, exponent);
-    ((V::splat(simd, 1.0) - power) - power * less_one) / x
+    ((1.0 - power) - power * less_one) / x
 }
 
 /// The exponent and `atanh((m - 1) / (m + 1))` of numbers above 0, whose mantissas m are from √½ to √2. `less_one` is the number less 1, more

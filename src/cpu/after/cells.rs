@@ -142,6 +142,14 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_lowest_bits_of_bytes_are_in_their_order() {
+        for lane in 0..8 {
+            assert_eq!(lowest_bits(0xff << (8 * lane)), 1 << lane);
+        }
+        assert_eq!((lowest_bits(u64::MAX), lowest_bits(0xfefe_fefe_fefe_fefe)), (0xff, 0));
+    }
+
+    #[test]
     fn a_cell_joins_the_voxels_that_its_points_take_values_from() {
         let grid = Grid::new(UVec3::new(11, 7, 9), DVec3::ONE);
         let value = |index: u32| match index.wrapping_mul(2_654_435_761) >> 24 {

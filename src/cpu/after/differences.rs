@@ -8,11 +8,11 @@ use crate::volume::{ValueSlice, Volume};
 /// The maximum number of voxels of a volume of which differences are kept, which then take 192 MiB at the most, and values as `f32`, which take 64 MiB.
 pub(super) const MAX_VOXELS: u64 = 1 << 24;
 
-/// `2·d` times the spacing, along x, y and z, for all voxels in memory order; d is the estimate of the gradient by differences. Of whole numbers they are whole
-/// numbers, which take half the memory if they are small.
+/// `2·d` times the spacing, along x, y and z, for all voxels in memory order; d is the estimate of the gradient by differences. Where all values of a volume
+/// are whole numbers, so are these, and if they fit in 16 bits they take half the memory.
 #[derive(Clone, Debug)]
 pub(super) enum Differences {
-    /// As [`ValueSlice`] does, a page has one type, so that it stays short.
+    /// Whole numbers. There are none on web pages, where all values are kept as `f32`.
     #[cfg(not(target_arch = "wasm32"))]
     Small(Vec<i16>),
     /// NaN beside a hole.
@@ -47,7 +47,7 @@ fn are_small(values: ValueSlice<'_>) -> bool {
     2.0 * (greatest - least) <= f32::from(i16::MAX)
 }
 
-/// The differences of all voxels, and some zeros.
+/// The differences of all voxels, each made a `T` by `of`, and [`Differences::PADDING`] zeros.
 fn differences<T: Copy + Default + Send>(volume: &Volume, of: impl Fn(f32) -> T + Sync) -> Vec<T> {
     let dims = volume.dims();
     let (nx, ny) = (dims.x as usize, dims.y as usize);

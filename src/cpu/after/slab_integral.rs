@@ -21,12 +21,12 @@ pub(super) struct Table {
     /// The first and the last cell that a number of each bin may lie in.
     bins: Vec<[u32; 2]>,
     cells: Vec<Cell>,
-    range: Range,
+    covered: Covered,
 }
 
-/// The numbers of a table.
-#[derive(Clone, Copy, Debug, Default)]
-struct Range {
+/// Which numbers a table covers, and how bins divide them.
+#[derive(Clone, Copy, Debug)]
+struct Covered {
     /// The min and the max number with an opacity.
     shown: [f32; 2],
     /// The min and the max number.
@@ -90,8 +90,8 @@ impl Table {
         let cell_points = HEAD + bin_count as usize;
         let bins = points[HEAD..cell_points].iter().map(|&[first, last, ..]| [first as u32, last as u32]).collect();
         let cells = points[cell_points..][..CELL * cells as usize].as_chunks().0.to_vec();
-        let range = Range { shown: [low, high], all: [first, end], bins_per_number, last_bin: bin_count - 1.0 };
-        Self { bins, cells, range, points }
+        let covered = Covered { shown: [low, high], all: [first, end], bins_per_number, last_bin: bin_count - 1.0 };
+        Self { bins, cells, covered, points }
     }
 
     /// The cell of a number in the table's range, given its bin.
@@ -110,16 +110,16 @@ impl<S: Simd> Between<S> {
     /// Those from f0 to f1 in the lanes that have a bit, given their tables, which may all be the same.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn new(simd: S, [f0, f1]: [f32x8<S>; 2], lanes: u32, tables: &[&Table; LANES], are_same: bool) -> Self {
-        let of = |number: fn(&Range) -> f32| match are_same {
-            true => f32x8::splat(simd, number(&tables[0].range)),
-            false => f32x8::load_array(simd, tables.map(|table| number(&table.range))),
+        let of = |number: fn(&Covered) -> f32| match are_same {
+            true => f32x8::splat(simd, number(&tables[0].covered)),
+            false => f32x8::load_array(simd, tables.map(|table| number(&table.covered))),
         };
-        let (least, greatest) = (of(|range| range.all[0]), of(|range| range.all[1]));
+        let (least, greatest) = (of(|covered| covered.all[0]), of(|covered| covered.all[1]));
         let (x0, x1) = (within(f0, [least, greatest]), within(f1, [least, greatest]));
         let is_rising = x0.simd_lt(x1);
         let (low, high) = (is_rising.select(x0, x1), is_rising.select(x1, x0));
-        let is_hidden = high.simd_lt(of(|range| range.shown[0])) | low.simd_gt(of(|range| range.shown[1]));
-        let (per_number, last_bin) = (of(|range| range.bins_per_number), of(|range| range.last_bin));
+        let is_hidden = high.simd_lt(of(|covered| covered.shown[0])) | low.simd_gt(of(|covered| covered.shown[1]));
+        let (per_number, last_bin) = (of(|covered| covered.bins_per_number), of(|covered| covered.last_bin));
         let bins = [low, high].map(|x| {
             let bin = within((x - least) * per_number, [f32x8::splat(simd, 0.0), last_bin]);
             bin.to_int::<i32x8<S>>().to_array()
@@ -128,7 +128,7 @@ impl<S: Simd> Between<S> {
     }
 }
 
-/// Numbers, or the ends of ranges that they lie beyond; the least of a range instead of NaN.
+/// Every number that lies in its range as it is. One below the range, or NaN, becomes the range's least number, and one above it the greatest.
 #[cfg_attr(not(debug_assertions), inline(always))]
 fn within<S: Simd>(x: f32x8<S>, [least, greatest]: [f32x8<S>; 2]) -> f32x8<S> {
     let at_least = x.simd_gt(least).select(x, least);
@@ -165,10 +165,10 @@ impl Integrals {
         let labels = has_labels.then(|| transfer.labels.keys()).into_iter().flatten();
         let labels: BTreeMap<u16, Table> = labels.map(|&label| (label, table(Some(label)))).collect();
         let plain = table(None);
-        let shown = labels.values().fold(plain.range.shown, |[low, high], table| {
+        let shown = labels.values().fold(plain.covered.shown, |[low, high], table| {
             [
-                if table.range.shown[0] < low { table.range.shown[0] } else { low },
-                if table.range.shown[1] > high { table.range.shown[1] } else { high },
+                if table.covered.shown[0] < low { table.covered.shown[0] } else { low },
+                if table.covered.shown[1] > high { table.covered.shown[1] } else { high },
             ]
         });
         Self { is_optical_depth: compositing == Compositing::Exponential, plain, labels, shown }
