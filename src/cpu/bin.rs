@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use fearless_simd::{Level, Simd, dispatch};
 use glam::{DVec2, DVec3};
 
 use super::project::Projection;
@@ -41,13 +42,19 @@ pub(super) fn columns(size: [u32; 2]) -> usize {
 }
 
 /// The bricks that may be on the image, by first sheet and then in memory order.
-pub(super) fn place(bricks: &[Brick], projection: &Projection, support: f64) -> Vec<Placed> {
+pub(super) fn place(level: Level, bricks: &[Brick], projection: &Projection, support: f64) -> Vec<Placed> {
     /// The bricks that a thread places at a time.
     const AT_A_TIME: usize = 1024;
     let of_chunk = |(chunk, bricks): (usize, &[Brick])| {
-        let numbered = (chunk * AT_A_TIME..).zip(bricks);
         let mut placed = Vec::with_capacity(bricks.len());
-        placed.extend(numbered.filter_map(|(number, brick)| place_brick(number as u32, brick, projection, support)));
+        dispatch!(level, simd => simd.vectorize(
+            #[cfg_attr(not(debug_assertions), inline(always))]
+            || {
+                for (number, brick) in (chunk * AT_A_TIME..).zip(bricks) {
+                    placed.extend(place_brick(number as u32, brick, projection, support));
+                }
+            },
+        ));
         placed
     };
     by_first(&bricks.par_chunks(AT_A_TIME).enumerate().map(of_chunk).collect::<Vec<_>>())
@@ -78,11 +85,13 @@ pub(super) fn by_first(lists: &[Vec<Placed>]) -> Vec<Placed> {
 }
 
 /// Where a brick is; `None` off the image.
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64) -> Option<Placed> {
     place_box(number, brick::bounds(brick), projection, support)
 }
 
 /// Where a box of voxels is, given by its middle and half its size; `None` off the image.
+#[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn place_box(
     number: u32,
     (middle, half): (DVec3, DVec3),

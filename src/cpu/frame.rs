@@ -163,7 +163,7 @@ impl<'a> Frame<'a> {
     /// Draws all tiles.
     pub(super) fn draw(&self, level: Level) -> Drawing {
         let placed = match &self.voxels {
-            Voxels::Whole { bricks, .. } => bin::place(bricks, &self.projection, self.support),
+            Voxels::Whole { bricks, .. } => bin::place(level, bricks, &self.projection, self.support),
             Voxels::Streamed(stream) => stream.placed(),
         };
         let has_hits = self.compositor.first_hit.is_some();

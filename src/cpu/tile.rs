@@ -249,13 +249,12 @@ impl<'a> TileWalk<'a> {
             if end > sheet || marks[0] == 0 && arrived.chunk.is_none() {
                 continue;
             }
-            let sections = simd.vectorize(
-                #[cfg_attr(not(debug_assertions), inline(always))]
-                || frame.projection.sections(&brick, place),
-            );
             let chunk = arrived.chunk.take();
             let drawn = chunk.as_ref().map_or(&frame.drawn, |chunk| &**chunk.drawn());
-            drawn.add(number, marks, &sections, tally);
+            simd.vectorize(
+                #[cfg_attr(not(debug_assertions), inline(always))]
+                || drawn.add(number, marks, &frame.projection.sections(&brick, place), tally),
+            );
             marks.fill(0);
         }
     }

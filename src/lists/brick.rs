@@ -197,6 +197,7 @@ pub fn origin(brick: &Brick) -> UVec3 {
 }
 
 /// The box of a brick's voxels: its middle and half its size in voxels.
+#[inline(always)]
 pub fn bounds(brick: &Brick) -> (DVec3, DVec3) {
     let half = UVec3::new(brick.extent & 3, brick.extent >> 2 & 3, brick.extent >> 4 & 3).as_dvec3() / 2.0;
     (UVec3::new(brick.x, brick.y, brick.z).as_dvec3() + half, half)
