@@ -31,9 +31,24 @@ pub(super) struct Placed {
     /// The middle of the box around all of its footprints, in pixel coordinates whose whole numbers are pixel centres, and half its size.
     pub(super) middle: [f32; 2],
     pub(super) half: [f32; 2],
-    /// The tiles that its footprints may touch: the first and last column, and the first and last row.
+    /// The tiles that its footprints may touch: the first and last column, and the first and last row. Off the image the first are larger.
     pub(super) columns: [u16; 2],
     pub(super) rows: [u16; 2],
+}
+
+impl Placed {
+    /// A brick off the image.
+    const NOWHERE: Self = Self {
+        brick: 0,
+        channel: 0,
+        first: 0,
+        end: 0,
+        half_box: [0.0; 2],
+        middle: [0.0; 2],
+        half: [0.0; 2],
+        columns: [1, 0],
+        rows: [1, 0],
+    };
 }
 
 /// The number of columns of tiles in an image.
@@ -41,47 +56,22 @@ pub(super) fn columns(size: [u32; 2]) -> usize {
     (size[0] as usize).div_ceil(COLUMNS)
 }
 
-/// The bricks that may be on the image, by first sheet and then in memory order.
-pub(super) fn place(level: Level, bricks: &[Brick], projection: &Projection, support: f64) -> Vec<Placed> {
+/// Where all bricks are, in their order; `placed` is the memory for it.
+pub(super) fn place(level: Level, bricks: &[Brick], projection: &Projection, support: f64, placed: &mut Vec<Placed>) {
     /// The bricks that a thread places at a time.
     const AT_A_TIME: usize = 1024;
-    let of_chunk = |(chunk, bricks): (usize, &[Brick])| {
-        let mut placed = Vec::with_capacity(bricks.len());
+    placed.resize(bricks.len(), Placed::NOWHERE);
+    let chunks = bricks.par_chunks(AT_A_TIME).zip(placed.par_chunks_mut(AT_A_TIME)).enumerate();
+    chunks.for_each(|(chunk, (bricks, placed))| {
         dispatch!(level, simd => simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
-                for (number, brick) in (chunk * AT_A_TIME..).zip(bricks) {
-                    placed.extend(place_brick(number as u32, brick, projection, support));
+                for ((number, brick), placed) in (chunk * AT_A_TIME..).zip(bricks).zip(placed) {
+                    *placed = place_brick(number as u32, brick, projection, support).unwrap_or(Placed::NOWHERE);
                 }
             },
         ));
-        placed
-    };
-    by_first(&bricks.par_chunks(AT_A_TIME).enumerate().map(of_chunk).collect::<Vec<_>>())
-}
-
-/// Sorts the bricks of several lists by first sheet; those that share it keep their order.
-pub(super) fn by_first(lists: &[Vec<Placed>]) -> Vec<Placed> {
-    let first = |placed: &Placed| placed.first;
-    let Some(least) = lists.iter().flatten().map(first).min() else { return Vec::new() };
-    // How many begin before each sheet.
-    let mut before = Vec::new();
-    for placed in lists.iter().flatten() {
-        let next = (placed.first - least) as usize + 1;
-        before.resize(before.len().max(next + 1), 0_u32);
-        before[next] += 1;
-    }
-    let mut sum = 0;
-    before.iter_mut().for_each(|count| (sum, *count) = (sum + *count, sum + *count));
-    let mut order = vec![(0, 0); lists.iter().map(Vec::len).sum()];
-    for (number, list) in (0_u32..).zip(lists) {
-        for (at, placed) in (0_u32..).zip(list) {
-            let place = &mut before[(placed.first - least) as usize];
-            order[*place as usize] = (number, at);
-            *place += 1;
-        }
-    }
-    order.into_par_iter().map(|(number, at)| lists[number as usize][at as usize].clone()).collect()
+    });
 }
 
 /// Where a brick is; `None` off the image.
@@ -122,22 +112,51 @@ pub(super) fn place_box(
     Some(Placed { brick: number, channel: 0, first, end, half_box, middle, half, columns, rows })
 }
 
-/// The bricks of each of some rows of tiles, as indices into the list of placed bricks.
-pub(super) fn by_row(placed: &[Placed], rows: usize) -> Vec<Vec<u32>> {
+/// A placed brick in a row of tiles.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct InRow {
+    /// Its index in the list of placed bricks.
+    at: u32,
+    first: i32,
+    columns: [u16; 2],
+}
+
+/// The bricks of each of some rows of tiles.
+pub(super) fn by_row(placed: &[Placed], rows: usize) -> Vec<Vec<InRow>> {
     let mut by_row = vec![Vec::new(); rows];
-    for (at, placed) in (0_u32..).zip(placed) {
-        let [first, last] = placed.rows.map(usize::from);
-        by_row.iter_mut().take(last + 1).skip(first).for_each(|row| row.push(at));
+    for (at, &Placed { first, columns, rows: [top, bottom], .. }) in (0..).zip(placed) {
+        let rows = by_row.iter_mut().take(bottom as usize + 1).skip(top.into());
+        rows.for_each(|row| row.push(InRow { at, first, columns }));
     }
     by_row
 }
 
-/// The bricks of every tile of a row of tiles, given those of the row.
-pub(super) fn by_tile(placed: &[Placed], of_row: &[u32], columns: usize) -> Vec<Vec<u32>> {
+/// The bricks of every tile of a row of tiles, as indices into the list of placed bricks: by first sheet, those that share it in the list's order.
+pub(super) fn by_tile(of_row: &[InRow], columns: usize) -> Vec<Vec<u32>> {
     let mut tiles = vec![Vec::new(); columns];
-    for &at in of_row {
-        let [first, last] = placed[at as usize].columns.map(usize::from);
-        tiles[first..=last].iter_mut().for_each(|tile| tile.push(at));
+    for InRow { at, columns: [first, last], .. } in by_first(of_row) {
+        tiles[first.into()..=last.into()].iter_mut().for_each(|tile| tile.push(at));
     }
     tiles
+}
+
+/// Sorts bricks by first sheet; those that share it keep their order.
+fn by_first(bricks: &[InRow]) -> Vec<InRow> {
+    let Some(least) = bricks.iter().map(|brick| brick.first).min() else { return Vec::new() };
+    // How many begin before each sheet.
+    let mut before = Vec::new();
+    for brick in bricks {
+        let next = (brick.first - least) as usize + 1;
+        before.resize(before.len().max(next + 1), 0_u32);
+        before[next] += 1;
+    }
+    let mut sum = 0;
+    before.iter_mut().for_each(|count| (sum, *count) = (sum + *count, sum + *count));
+    let mut sorted = bricks.to_vec();
+    for brick in bricks {
+        let place = &mut before[(brick.first - least) as usize];
+        sorted[*place as usize] = *brick;
+        *place += 1;
+    }
+    sorted
 }

@@ -37,9 +37,17 @@ pub(super) struct Drawn {
 impl Drawn {
     /// The record before any tile is drawn.
     pub(super) fn new(bricks: usize, view: &ViewGeometry) -> Self {
+        Self::default().renewed(bricks, view)
+    }
+
+    /// The same, in the memory of another frame's.
+    pub(super) fn renewed(self, bricks: usize, view: &ViewGeometry) -> Self {
         let most_sheets = 2.0 * view.reach / view.slabs.width + 2.0;
         let masks = 1 + (most_sheets as usize).div_ceil(SECTIONS);
-        Self { marks: (0..bricks * masks).map(|_| AtomicU64::new(0)).collect(), masks }
+        let mut marks = self.marks;
+        marks.clear();
+        marks.resize_with(bricks * masks, || AtomicU64::new(0));
+        Self { marks, masks }
     }
 
     /// Adds what a tile has marked of a brick, given how many sections its voxels have.

@@ -75,6 +75,37 @@ pub(super) enum Voxels<'a> {
     Streamed(&'a Arc<Stream>),
 }
 
+/// Memory that the next frame of the same bricks uses again. What is given back to the system costs a fault for every page when it is needed again.
+#[derive(Debug, Default)]
+pub(super) struct Reused {
+    drawn: Drawn,
+    placed: Vec<Placed>,
+}
+
+/// A copy gets memory of its own.
+impl Clone for Reused {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl Reused {
+    /// Draws the frame of a view, as [`Frame::new`].
+    pub(super) fn draw(
+        &mut self,
+        (grid, voxels): (&Grid, Voxels<'_>),
+        scene: &Scene,
+        view: ViewGeometry,
+        host: Host,
+        level: Level,
+    ) -> Drawing {
+        let frame = Frame::new(grid, voxels, scene, view, host, (level, std::mem::take(&mut self.drawn)));
+        let drawing = frame.draw(level, &mut self.placed);
+        self.drawn = frame.drawn;
+        drawing
+    }
+}
+
 /// A drawn frame.
 #[derive(Clone, Debug)]
 pub(super) struct Drawing {
@@ -100,14 +131,14 @@ pub(super) struct Host {
 }
 
 impl<'a> Frame<'a> {
-    /// A frame in a view.
-    pub(super) fn new(
+    /// A frame in a view. `drawn` is the memory for its record of what is drawn.
+    fn new(
         grid: &Grid,
         voxels: Voxels<'a>,
         scene: &Scene,
         view: ViewGeometry,
         Host { window, is_part, first_hit, surfaces }: Host,
-        level: Level,
+        (level, drawn): (Level, Drawn),
     ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
@@ -146,7 +177,7 @@ impl<'a> Frame<'a> {
             shader: Shader::new(&scene.shading, splatting.compositing),
             compositor,
             rays: RayMode::new(scene, &view, grid, surfaces),
-            drawn: Drawn::new(bricks, &view),
+            drawn: drawn.renewed(bricks, &view),
             is_each,
             counted: covered.map_or(i32::MIN..i32::MIN, |slabs| projection.sheets_of(&slabs)),
             touched: projection.sheets_of(&overlaps.slabs),
@@ -160,20 +191,20 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Draws all tiles.
-    pub(super) fn draw(&self, level: Level) -> Drawing {
-        let placed = match &self.voxels {
-            Voxels::Whole { bricks, .. } => bin::place(level, bricks, &self.projection, self.support),
-            Voxels::Streamed(stream) => stream.placed(),
-        };
+    /// Draws all tiles. `placed` is the memory for where bricks are.
+    fn draw(&self, level: Level, placed: &mut Vec<Placed>) -> Drawing {
+        match &self.voxels {
+            Voxels::Whole { bricks, .. } => bin::place(level, bricks, &self.projection, self.support, placed),
+            Voxels::Streamed(stream) => *placed = stream.placed(),
+        }
         let has_hits = self.compositor.first_hit.is_some();
         let outputs = Outputs { has_hits, has_extremes: false };
         let (content, first_hits, tally) = draw_tiles(
             (self.projection.view.size, &self.region),
             outputs,
-            &placed,
+            placed,
             || TileWalk::new(self),
-            |walk, origin, bricks| dispatch!(level, simd => self.draw_tile(simd, walk, origin, &placed, bricks)),
+            |walk, origin, bricks| dispatch!(level, simd => self.draw_tile(simd, walk, origin, placed, bricks)),
         );
         let [columns, rows] = tile_grid(self.projection.view.size);
         let overlaps = match &self.voxels {
@@ -305,7 +336,7 @@ pub(super) fn draw_tiles<W: Send>(
     let idle_walks = || walks.lock().unwrap_or_else(PoisonError::into_inner);
     let tally = strips.into_par_iter().enumerate().map(|(at, (colors, (extremes, hits)))| {
         let row = first_row + at;
-        let bins = bin::by_tile(placed, &by_row[row], columns);
+        let bins = bin::by_tile(&by_row[row], columns);
         // Tile by tile, because a thread that is handed several of the last ones draws alone while others wait.
         let tiles = bins[drawn.clone()].par_iter().zip(drawn.clone()).with_max_len(1).map(|(bricks, column)| {
             let idle = idle_walks().pop();

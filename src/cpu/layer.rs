@@ -6,7 +6,7 @@ use fearless_simd::Level;
 
 use super::after;
 use super::after::Coefficients;
-use super::frame::{Drawing, Frame, Host, Voxels};
+use super::frame::{Drawing, Host, Reused, Voxels};
 use super::material::Materials;
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
@@ -29,8 +29,8 @@ pub(super) struct Layer {
 /// What voxels are drawn from.
 #[derive(Clone, Debug)]
 enum List {
-    /// Those that take part in any channel, and their materials.
-    Before(Box<BrickList>, Materials),
+    /// Those that take part in any channel, their materials, and memory for frames.
+    Before(Box<BrickList>, Materials, Reused),
     /// Those of each channel.
     After(Vec<Coefficients>),
 }
@@ -69,10 +69,10 @@ impl Layer {
     fn draw(&mut self, scene: &Scene, view: ViewGeometry, host: Host, level: Level) -> Drawing {
         let Self { volume, transfer, list } = self;
         match list {
-            List::Before(bricks, materials) => {
+            List::Before(bricks, materials, reused) => {
                 let channels = channels(volume, transfer).collect();
                 let voxels = Voxels::Whole { channels, bricks: bricks.bricks(), materials };
-                Frame::new(volume.grid(), voxels, scene, view, host, level).draw(level)
+                reused.draw((volume.grid(), voxels), scene, view, host, level)
             }
             List::After(coefficients) => {
                 let sharing = coefficients.len();
@@ -100,7 +100,7 @@ impl List {
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
         let bricks = brick_list(volume, transfer, &clipped);
         let materials = Materials::new(bricks.bricks().len(), channels(volume, transfer).count());
-        Ok(Self::Before(Box::new(bricks), materials))
+        Ok(Self::Before(Box::new(bricks), materials, Reused::default()))
     }
 }
 
@@ -183,7 +183,7 @@ mod tests {
     fn list_of(renderer: &CpuRenderer) -> *const () {
         let layer = &renderer.layers[0];
         match &layer.list {
-            List::Before(bricks, _) => bricks.bricks().as_ptr().cast(),
+            List::Before(bricks, ..) => bricks.bricks().as_ptr().cast(),
             List::After(coefficients) => match coefficients[0].all(&layer.volume) {
                 ValueSlice::F32(all) => all.as_ptr().cast(),
                 values => panic!("{values:?} are no coefficients"),

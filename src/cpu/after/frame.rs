@@ -16,7 +16,6 @@ use super::planes::Points;
 use super::slab_integral::Integrals;
 use super::tile::TileWalk;
 use crate::after::normalization::Normalization;
-use crate::cpu::bin::by_first;
 use crate::cpu::composite::Compositor;
 use crate::cpu::cut::{RayMode, TileRays};
 use crate::cpu::first_hit;
@@ -186,7 +185,7 @@ impl<'a> Frame<'a> {
             placed.iter_mut().for_each(|placed| placed.channel = frame.channel as u32);
             placed
         };
-        let placed = by_first(&frames.iter().map(place).collect::<Vec<_>>());
+        let placed = frames.iter().map(place).collect::<Vec<_>>().concat();
         let has_hits = first.compositor.first_hit.is_some();
         let has_extremes = first.resolver.is_none() && is_choice(first.compositing);
         let (content, first_hits, tally) = draw_tiles(

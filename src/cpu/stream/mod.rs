@@ -112,7 +112,7 @@ impl Stream {
         values
     }
 
-    /// All chunks that may be on the image, by first sheet.
+    /// All chunks that may be on the image, in memory order.
     pub(super) fn placed(&self) -> Vec<Placed> {
         self.source.placed()
     }

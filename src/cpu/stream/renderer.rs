@@ -12,7 +12,7 @@ use super::ranges::Ranges;
 use super::source::{Source, Splats};
 use crate::after::normalization::Normalization;
 use crate::cpu::after::{self, Matter};
-use crate::cpu::frame::{Drawing, Frame, Host, Voxels};
+use crate::cpu::frame::{Drawing, Host, Reused, Voxels};
 use crate::cpu::project::Projection;
 use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::cpu::simd::{self, Simd};
@@ -172,7 +172,7 @@ impl StreamRenderer {
                 self.check_held(frame.held_bytes())?;
                 after::Frame::draw(&[frame], self.level)
             }
-            _ => Frame::new(&grid, Voxels::Streamed(&stream), scene, view, host, self.level).draw(self.level),
+            _ => Reused::default().draw((&grid, Voxels::Streamed(&stream)), scene, view, host, self.level),
         };
         if let Some(failure) = stream.pool.take_failure() {
             return Err(failure.into());

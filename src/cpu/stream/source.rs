@@ -102,12 +102,10 @@ impl Source {
         (from, self.side.min(self.grid.dims - from))
     }
 
-    /// All chunks that may be on the image, by first sheet.
+    /// All chunks that may be on the image, in memory order.
     pub(super) fn placed(&self) -> Vec<Placed> {
         let place = |number| if self.shows_nothing(number) { None } else { self.place(number, self.bounds(number)) };
-        let mut placed: Vec<Placed> = (0..self.across().element_product()).filter_map(place).collect();
-        placed.sort_unstable_by_key(|placed| (placed.first, placed.brick));
-        placed
+        (0..self.across().element_product()).filter_map(place).collect()
     }
 
     /// Where the voxels of a chunk within a box are, whatever their values; `None` off the image, or if voxels are not splatted.
