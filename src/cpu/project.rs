@@ -200,8 +200,8 @@ impl Projection {
                 for (first, offset) in first.iter_mut().zip(&self.offsets.depth) {
                     let depth = place.depth + offset;
                     *first = match self.direction > 0 {
-                        true => floor(depth - reach + slab::ROUNDING),
-                        false => 1 + floor(-(depth + reach - slab::ROUNDING)),
+                        true => first_plane(depth - reach),
+                        false => 1 - end_plane(depth + reach),
                     };
                 }
                 return first;
@@ -268,7 +268,7 @@ impl Projection {
     /// The same of all sheets.
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn unclipped(&self, first: f64, end: f64) -> Range<i32> {
-        let (first, end) = (floor(first + slab::ROUNDING), -floor(-(end - slab::ROUNDING)));
+        let (first, end) = (first_plane(first), end_plane(end));
         if self.direction > 0 { first..end } else { 1 - end..1 - first }
     }
 
@@ -361,24 +361,56 @@ fn principal_axis(difference: f64, product: f64) -> DVec2 {
     if difference >= 0.0 { DVec2::new(larger, smaller) } else { DVec2::new(smaller, larger) }
 }
 
-/// The largest integer that is not above a number below 2³¹, without the system's `floor` or a branch.
+/// The last plane up to a depth and its rounding error ([`slab::ROUNDING`]), in slabs: the one nearest to half a slab before. Because of that error no depth lies in
+/// the middle between two planes.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn first_plane(depth: f64) -> i32 {
+    nearest(depth + (slab::ROUNDING - 0.5))
+}
+
+/// The first plane from a depth less its rounding error on.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn end_plane(depth: f64) -> i32 {
+    nearest(depth - (slab::ROUNDING - 0.5))
+}
+
+/// Added to a number below 2³¹, 1.5·2⁵² rounds it to a whole number, which is then in the low bits.
+const MAGIC: f64 = 6_755_399_441_055_744.0;
+
+/// The nearest whole number.
+#[cfg_attr(not(debug_assertions), inline(always))]
+fn nearest(x: f64) -> i32 {
+    (x + MAGIC).to_bits() as i32
+}
+
+/// The largest integer that is not above a number, without the system's `floor` or a branch.
 #[cfg_attr(not(debug_assertions), inline(always))]
 pub(super) fn floor(x: f64) -> i32 {
-    // Adding 1.5·2⁵² rounds to a whole number, which is then in the low bits.
-    const MAGIC: f64 = 6_755_399_441_055_744.0;
     let rounded = (x + MAGIC) - MAGIC;
     let floored = rounded - f64::from(u8::from(rounded > x));
-    (floored + MAGIC).to_bits() as i32
+    nearest(floored)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::slab::SlabGrid;
 
     #[test]
     fn floors() {
         for x in [-3.0, -2.5, -0.1, 0.0, 0.9, 7.0, 1e6 + 0.5] {
             assert_eq!(f64::from(floor(x)), x.floor(), "{x}");
+        }
+    }
+
+    #[test]
+    fn planes_enclose_depths_but_for_rounding_errors() {
+        for x in [-3.0, -2.5, -0.5, -0.1, 0.0, 0.5, 0.9, 1.5, 7.0, 1e6 + 0.5] {
+            for error in [-1e-10, 0.0, 1e-10] {
+                let depth = x + error;
+                let slabs = SlabGrid { origin: 0.0, width: 1.0 }.touched(depth, depth + 1.0);
+                assert_eq!(first_plane(depth)..end_plane(depth + 1.0), slabs, "{depth}");
+            }
         }
     }
 

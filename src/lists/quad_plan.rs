@@ -188,7 +188,7 @@ pub struct PlaceDepths {
     depth: DVec4,
     /// The depths of slots relative to the brick's first.
     places: [f64; brick::BRICK_VOXELS as usize],
-    /// The reach of a kernel.
+    /// The reach of a kernel, and half a slab.
     reach: f64,
 }
 
@@ -199,7 +199,7 @@ impl PlaceDepths {
         depth.w -= view.slabs.origin;
         depth /= view.slabs.width;
         let places = std::array::from_fn(|place| depth.truncate().dot(brick::in_brick(place as u32).as_dvec3()));
-        Self { depth, places, reach: view.reach / view.slabs.width - slab::ROUNDING }
+        Self { depth, places, reach: view.reach / view.slabs.width - slab::ROUNDING + 0.5 }
     }
 
     /// Counts the overlaps of the voxels in a brick.
@@ -207,27 +207,31 @@ impl PlaceDepths {
     pub fn overlaps(&self, brick: &Brick) -> Overlaps {
         let origin = self.depth.dot(brick::origin(brick).as_dvec3().extend(1.0));
         let present = brick::present(brick);
-        let (mut sections, mut nearest, mut farthest) = (0, i32::MAX, i32::MIN);
+        if present == 0 {
+            return Overlaps::default();
+        }
+        let (mut sections, mut nearest, mut farthest) = (0, i64::MAX, i64::MIN);
         // All places, without a branch, so that the loop is vectorized.
         for (place, depth) in self.places.iter().enumerate() {
             let depth = origin + depth;
-            let (first, end) = (floor(depth - self.reach), -floor(-depth - self.reach));
+            // Half a slab more, to the nearest plane: the planes that enclose a kernel. It never lies in the middle between two, because of
+            // `slab::ROUNDING`.
+            let (first, end) = (nearest_plane(depth - self.reach), nearest_plane(depth + self.reach));
             let is_present = present >> place & 1 == 1;
             sections += if is_present { end - first } else { 0 };
-            nearest = nearest.min(if is_present { first } else { i32::MAX });
-            farthest = farthest.max(if is_present { end } else { i32::MIN });
+            nearest = nearest.min(if is_present { first } else { i64::MAX });
+            farthest = farthest.max(if is_present { end } else { i64::MIN });
         }
-        let (voxels, sections) = (present.count_ones().into(), sections as u64);
-        Overlaps { voxels, sections, slabs: nearest..farthest }
+        // The low bits are planes' numbers.
+        let slabs = nearest as i32..farthest as i32;
+        Overlaps { voxels: present.count_ones().into(), sections: sections as u64, slabs }
     }
 }
 
-/// The largest integer up to a slab's number, without the system's `floor` or a branch.
+/// The plane nearest to a depth, as a number whose low 32 bits are the plane's and whose differences are those of planes.
 #[inline(always)]
-fn floor(slab: f64) -> i32 {
+fn nearest_plane(slabs: f64) -> i64 {
     // Adding 1.5·2⁵² rounds to a whole number, which is then in the low bits.
     const MAGIC: f64 = 6_755_399_441_055_744.0;
-    let rounded = (slab + MAGIC) - MAGIC;
-    let floored = if rounded > slab { rounded - 1.0 } else { rounded };
-    (floored + MAGIC).to_bits() as i32
+    (slabs + MAGIC).to_bits() as i64
 }
