@@ -162,7 +162,7 @@ impl Frame<'_> {
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
-                let new = field.values(simd, of, [column, row], missing);
+                let new = field.values(simd, of, [column, row], missing, &mut plane.weights);
                 bits(missing.into()).for_each(|lane| values[column + lane as usize] = new[lane as usize]);
             },
         );
@@ -177,14 +177,14 @@ impl Frame<'_> {
         }
         plane.graded[row] |= missing << column;
         let Some(of) = &plane.points else { return };
-        let PlaneRow { values, gradients } = &mut plane.rows[row];
+        let (PlaneRow { values, gradients }, weights) = (&mut plane.rows[row], &mut plane.weights);
         simd.vectorize(
             #[cfg_attr(not(debug_assertions), inline(always))]
             || {
                 let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
                 let mut numbers = [0.0; LANES];
                 numbers.copy_from_slice(&values[column..column + LANES]);
-                let new = field.gradients(simd, of, [column, row], missing, &numbers);
+                let new = field.gradients(simd, of, [column, row], missing, &numbers, weights);
                 for (gradients, new) in gradients.iter_mut().zip(new) {
                     bits(missing.into()).for_each(|lane| gradients[column + lane as usize] = new[lane as usize]);
                 }

@@ -6,6 +6,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, u32x8};
 use glam::DVec3;
 
+use super::field::Weights;
 use super::held::{Extent, Held};
 use super::low_pass::LowPass;
 use crate::cpu::project::floor;
@@ -41,6 +42,11 @@ pub(super) struct Eight {
     pub(super) indices: [u32; LANES],
 }
 
+impl Eight {
+    /// Some points.
+    pub(super) const NONE: Self = Self { cells: [[0; LANES]; 3], rest: [[0.0; LANES]; 3], indices: [0; LANES] };
+}
+
 impl Points {
     /// The point of a pixel.
     #[cfg_attr(not(debug_assertions), inline(always))]
@@ -60,7 +66,7 @@ impl Points {
     ) -> Eight {
         let first = self.of(column, row);
         let (dims, low, held) = (extent.dims.to_array(), extent.low.to_array(), extent.held.to_array());
-        let mut eight = Eight { cells: [[0; LANES]; 3], rest: [[0.0; LANES]; 3], indices: [0; LANES] };
+        let mut eight = Eight::NONE;
         let mut index = i32x8::splat(simd, 0);
         for axis in [2, 1, 0] {
             // Relative to a whole number near by, so that f32 tells where in its cell a point is.
@@ -89,6 +95,8 @@ pub(super) struct Plane {
     pub(super) points: Option<(Points, LowPass)>,
     /// The voxels of a store around the points.
     pub(super) held: Option<Arc<Held>>,
+    /// The weights of the last points whose values or gradients were computed.
+    pub(super) weights: Box<Weights>,
     /// The pixels whose cells' bits are known, row by row, and these.
     pub(super) seen: [u32; ROWS],
     pub(super) reaches: [u32; ROWS],
@@ -115,6 +123,7 @@ impl Plane {
             number: 0,
             points: None,
             held: None,
+            weights: Box::new(Weights::new()),
             seen: none,
             reaches: none,
             stays: none,
@@ -127,9 +136,17 @@ impl Plane {
         }
     }
 
+    /// Takes its values from other voxels of a store.
+    pub(super) fn hold(&mut self, held: Option<Arc<Held>>) {
+        self.held = held;
+        // They have the voxels' indices.
+        self.weights.clear();
+    }
+
     /// Makes this plane another one.
     pub(super) fn become_plane(&mut self, number: i32, points: Option<(Points, LowPass)>) {
         (self.number, self.points) = (number, points);
+        self.weights.clear();
         let Self { seen, reaches, stays, known, graded, colored, chosen, .. } = self;
         for rows in [seen, reaches, stays, known, graded, colored, chosen] {
             *rows = [0; ROWS];

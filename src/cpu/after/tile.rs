@@ -112,7 +112,7 @@ impl<'a> TileWalk<'a> {
         }
         for Channel { frame, planes, active } in &mut self.channels {
             planes[1].become_plane(slab, frame.points(slab, origin));
-            planes.iter_mut().for_each(|plane| plane.held = None);
+            planes.iter_mut().for_each(|plane| plane.hold(None));
             active.clear();
         }
     }
@@ -163,7 +163,7 @@ impl<'a> TileWalk<'a> {
             planes.swap(0, 1);
             if planes[0].held.as_ref().is_none_or(|held| !held.suffices(frame, slab, *origin, open)) {
                 let held = frame.hold(slab, *origin, open).map(Arc::new);
-                planes.iter_mut().for_each(|plane| plane.held.clone_from(&held));
+                planes.iter_mut().for_each(|plane| plane.hold(held.clone()));
             }
             for (plane, number) in planes.iter_mut().zip([slab, slab + 1]) {
                 if plane.number != number || number == slab + 1 {

@@ -5,7 +5,7 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x4, f32x8, f32x16, u8x64};
 use glam::UVec3;
 
-use super::{Cube, Field};
+use super::Field;
 use crate::cpu::after::differences::{Differences, Neighbours};
 use crate::cpu::after::planes::Eight;
 use crate::cpu::count::bits;
@@ -21,56 +21,144 @@ const OFFSETS: [[f32; SIDE * SIDE]; 2] = [
     [0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0, 3.0],
 ];
 
-/// The kernels around eight points: `g = in_plane·along`, cut off at the radius. They are computed for all points before any is used, so that processors
-/// need not wait for one to begin with the next.
+/// The voxels around eight neighbouring points of a plane, and the kernels there: `g = in_plane·along`, cut off at the radius. They are computed for all
+/// points before any is used, so that processors need not wait for one to begin with the next, and kept, because gradients need those of values.
+#[derive(Clone, Debug)]
 #[repr(align(64))]
-pub(super) struct Weights {
+pub(in crate::cpu::after) struct Weights {
+    /// g by point and z.
+    planes: [[[f32; SIDE * SIDE]; SIDE]; LANES],
     in_plane: [[f32; SIDE * SIDE]; LANES],
     /// The squares of δ along x and y.
     squared: [[f32; SIDE * SIDE]; LANES],
-    /// By z: δ, its Gaussian, and the square of the other components of δ at the kernel's radius.
-    z: [[f32; SIDE]; LANES],
+    /// By z: the Gaussian of δ, and the square of its other components at the kernel's radius.
     along: [[f32; SIDE]; LANES],
-    limit: [[f32; SIDE]; LANES],
+    limits: [[f32; SIDE]; LANES],
+    /// N.
+    totals: [f32; LANES],
+    cubes: Eight,
+    /// The first point's pixel in its tile.
+    at: [usize; 2],
+    /// The bits of the points whose weights are known.
+    known: u32,
 }
 
 impl Weights {
-    /// Those of the points that have a bit.
+    /// None.
+    pub(in crate::cpu::after) fn new() -> Self {
+        let (in_plane, along) = ([[0.0; SIDE * SIDE]; LANES], [[0.0; SIDE]; LANES]);
+        Self {
+            planes: [[[0.0; SIDE * SIDE]; SIDE]; LANES],
+            in_plane,
+            squared: in_plane,
+            along,
+            limits: along,
+            totals: [0.0; LANES],
+            cubes: Eight::NONE,
+            at: [0; 2],
+            known: 0,
+        }
+    }
+
+    /// Forgets them.
+    pub(in crate::cpu::after) fn clear(&mut self) {
+        self.known = 0;
+    }
+
+    /// Whether those of a pixel and its neighbours that have a bit are known.
+    pub(super) fn are_known(&self, at: [usize; 2], lanes: u32) -> bool {
+        self.at == at && lanes & !self.known == 0
+    }
+
+    /// Computes those of the points that have a bit, and with `HAS_SUMS` returns `Σ (c - base)·g` of each as four numbers to be added. Not finite if a hole is
+    /// near.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn new<S: Simd>(simd: S, field: &Field<'_>, cubes: &Eight, lanes: u32) -> Self {
-        let none = [[0.0; SIDE]; LANES];
-        let in_plane = [[0.0; SIDE * SIDE]; LANES];
-        let mut weights = Self { in_plane, squared: in_plane, z: none, along: none, limit: none };
+    pub(super) fn find<S: Simd, const HAS_SUMS: bool>(
+        &mut self,
+        simd: S,
+        field: &Field<'_>,
+        cubes: Eight,
+        at: [usize; 2],
+        lanes: u32,
+    ) -> [[f32; SIDE]; LANES] {
+        let Self { planes, in_plane, squared, along, limits, .. } = self;
         for lane in bits(lanes.into()) {
             let lane = lane as usize;
-            let [x, y] = offsets(simd, cubes, lane);
-            let squared = x * x + y * y;
-            gaussian(simd, squared * field.exponent).store_array(&mut weights.in_plane[lane]);
-            squared.store_array(&mut weights.squared[lane]);
+            let [x, y] = offsets(simd, &cubes, lane);
+            let of = x * x + y * y;
+            gaussian(simd, of * field.exponent).store_array(&mut in_plane[lane]);
+            of.store_array(&mut squared[lane]);
         }
-        let Self { z, along, limit, .. } = &mut weights;
         // Four points at a time.
-        let z = z.as_chunks_mut::<SIDE>().0.iter_mut();
-        let by_four = z.zip(along.as_chunks_mut::<SIDE>().0).zip(limit.as_chunks_mut::<SIDE>().0);
-        for (((z, along), limit), rest) in by_four.zip(cubes.rest[2].as_chunks::<SIDE>().0) {
+        let by_four = along.as_chunks_mut::<SIDE>().0.iter_mut().zip(limits.as_chunks_mut::<SIDE>().0);
+        for ((along, limits), rest) in by_four.zip(cubes.rest[2].as_chunks::<SIDE>().0) {
             let [a, b, c, d] = rest.map(|z| f32x4::splat(simd, z));
             let offset = a.combine(b).combine(c.combine(d)) - f32x16::load_array(simd, OFFSETS[0]);
             let squared = offset * offset;
-            offset.store_slice(z.as_flattened_mut());
             gaussian(simd, squared * field.exponent).store_slice(along.as_flattened_mut());
-            (f32x16::splat(simd, field.radius_squared) - squared).store_slice(limit.as_flattened_mut());
+            (f32x16::splat(simd, field.radius_squared) - squared).store_slice(limits.as_flattened_mut());
         }
-        weights
+        let [step_y, step_z] = field.steps();
+        let zero = f32x16::splat(simd, 0.0);
+        let (mut totals, mut sums) = ([[0.0; SIDE]; LANES], [[0.0; SIDE]; LANES]);
+        for lane in bits(lanes.into()) {
+            let lane = lane as usize;
+            let first = cubes.indices[lane] as usize;
+            let (mut total, mut sum) = (zero, zero);
+            for z in 0..SIDE {
+                let squared = f32x16::load_array_ref(simd, &squared[lane]);
+                let is_inside = squared.simd_lt(f32x16::splat(simd, limits[lane][z]));
+                let in_plane = f32x16::load_array_ref(simd, &in_plane[lane]);
+                let weight = is_inside.select(in_plane * along[lane][z], zero);
+                weight.store_array(&mut planes[lane][z]);
+                total += weight;
+                if HAS_SUMS {
+                    let c = rows(simd, field.coefficients, first + z * step_z, step_y) - field.base;
+                    sum += weight * c;
+                }
+            }
+            quarters(total).store_array(&mut totals[lane]);
+            quarters(sum).store_array(&mut sums[lane]);
+        }
+        sums_of(simd, &totals).store_array(&mut self.totals);
+        (self.cubes, self.at, self.known) = (cubes, at, lanes);
+        sums
+    }
+
+    /// N by point.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn totals<S: Simd>(&self, simd: S) -> f32x8<S> {
+        f32x8::load_array_ref(simd, &self.totals)
     }
 
     /// g of the voxels of one z around a point.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn at<S: Simd>(&self, simd: S, lane: usize, z: usize) -> f32x16<S> {
-        let squared = f32x16::load_array_ref(simd, &self.squared[lane]);
-        let is_inside = squared.simd_lt(f32x16::splat(simd, self.limit[lane][z]));
-        let in_plane = f32x16::load_array_ref(simd, &self.in_plane[lane]);
-        is_inside.select(in_plane * self.along[lane][z], f32x16::splat(simd, 0.0))
+    fn plane<S: Simd>(&self, simd: S, lane: usize, z: usize) -> f32x16<S> {
+        f32x16::load_array_ref(simd, &self.planes[lane][z])
     }
+
+    /// g of a row of voxels along x.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn row<S: Simd>(&self, simd: S, lane: usize, row: usize) -> f32x4<S> {
+        let (plane, first) = (&self.planes[lane][row / SIDE], row % SIDE * SIDE);
+        f32x4::from_slice(simd, &plane[first..first + SIDE])
+    }
+
+    /// A point's cube.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    fn cube(&self, lane: usize) -> Cube {
+        let Eight { cells: [x, y, z], indices, .. } = &self.cubes;
+        let first = UVec3::new(x[lane] as u32, y[lane] as u32, z[lane] as u32);
+        Cube { first, index: indices[lane] as usize }
+    }
+}
+
+/// 4×4×4 voxels of a volume.
+#[derive(Clone, Copy, Debug)]
+struct Cube {
+    /// The first voxel, and its index among those at hand.
+    first: UVec3,
+    index: usize,
 }
 
 /// δ along x and y of sixteen voxels around one of eight points.
@@ -80,103 +168,41 @@ fn offsets<S: Simd>(simd: S, Eight { rest, .. }: &Eight, lane: usize) -> [f32x16
     [of(0), of(1)]
 }
 
-/// The kernels around a point, for each row of voxels along x: `g = along·across`, cut off at the radius.
-pub(super) struct RowWeights {
-    /// The Gaussian of δ along x, and its square.
-    along: [f32; SIDE],
-    squared: [f32; SIDE],
-    /// By row: the Gaussian of the other components, and the square of the component along x at the kernel's radius.
-    across: [f32; SIDE * SIDE],
-    limits: [f32; SIDE * SIDE],
-}
-
-impl RowWeights {
-    pub(super) const NONE: Self =
-        Self { along: [0.0; SIDE], squared: [0.0; SIDE], across: [0.0; SIDE * SIDE], limits: [0.0; SIDE * SIDE] };
-
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn new<S: Simd>(simd: S, field: &Field<'_>, [x, y, z]: [f32; 3]) -> Self {
-        /// The voxels of an axis, for each of three axes.
-        const VOXELS: [f32; 4 * SIDE] =
-            [0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 0.0];
-        let (x, y, z) = (f32x4::splat(simd, x), f32x4::splat(simd, y), f32x4::splat(simd, z));
-        let offset = x.combine(y).combine(z.combine(z)) - f32x16::load_array(simd, VOXELS);
-        let squared = offset * offset;
-        let (of_xy, of_z) = gaussian(simd, squared * field.exponent).split();
-        let (xy_squared, z_squared) = squared.split();
-        let ((of_x, of_y), (of_z, _)) = (of_xy.split(), of_z.split());
-        let ((x_squared, y_squared), (z_squared, _)) = (xy_squared.split(), z_squared.split());
-        let (of_z, left) = (of_z.to_array(), (f32x4::splat(simd, field.radius_squared) - z_squared).to_array());
-        let (along, squared) = (of_x.to_array(), x_squared.to_array());
-        let mut rows = Self { along, squared, across: [0.0; SIDE * SIDE], limits: [0.0; SIDE * SIDE] };
-        let (across, limits) = (rows.across.as_chunks_mut::<SIDE>().0, rows.limits.as_chunks_mut::<SIDE>().0);
-        for z in 0..SIDE {
-            (of_y * of_z[z]).store_array(&mut across[z]);
-            (f32x4::splat(simd, left[z]) - y_squared).store_array(&mut limits[z]);
-        }
-        rows
-    }
-}
-
 impl Field<'_> {
-    /// N and `Σ (c - base)·g` of one of eight points, each as four numbers to be added. Not finite if a hole is near.
+    /// `2·Σ d·g` of a point. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn cube_sums<S: Simd>(&self, simd: S, cubes: &Eight, weights: &Weights, lane: usize) -> [f32x4<S>; 2] {
-        let [step_y, step_z] = self.steps();
-        let first = cubes.indices[lane] as usize;
-        let zero = f32x16::splat(simd, 0.0);
-        let (mut total, mut sum) = (zero, zero);
-        for z in 0..SIDE {
-            let weight = weights.at(simd, lane, z);
-            let c = rows(simd, self.coefficients, first + z * step_z, step_y) - self.base;
-            total += weight;
-            sum += weight * c;
-        }
-        [quarters(total), quarters(sum)]
-    }
-
-    /// `2·Σ d·g` of a point, and N. Not finite if a hole is near.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn cube_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> f32x4<S> {
+    pub(super) fn cube_differences<S: Simd>(&self, simd: S, weights: &Weights, lane: usize) -> f32x4<S> {
         match self.differences {
             #[cfg(not(target_arch = "wasm32"))]
-            Some(Differences::Small(all)) => self.kept_differences(simd, cube, rows, all),
-            Some(Differences::Any(all)) => self.kept_differences(simd, cube, rows, all),
-            None => self.new_differences(simd, cube, rows),
+            Some(Differences::Small(all)) => self.kept_differences(simd, weights, lane, all),
+            Some(Differences::Any(all)) => self.kept_differences(simd, weights, lane, all),
+            None => self.new_differences(simd, weights, lane),
         }
     }
 
     /// The same of differences that are kept: x, y and z of a row's four voxels side by side.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn kept_differences<S: Simd, T: Sample>(&self, simd: S, cube: &Cube, rows: &RowWeights, all: &[T]) -> f32x4<S> {
-        let (along, squared) = (by_difference(simd, rows.along), by_difference(simd, rows.squared));
-        let zero = f32x16::splat(simd, 0.0);
-        let (mut total, mut sums) = (zero, zero);
-        for (row, index) in self.rows_of(cube).into_iter().enumerate() {
-            let is_inside = squared.simd_lt(f32x16::splat(simd, rows.limits[row]));
-            let weight = is_inside.select(along * rows.across[row], zero);
-            total += weight;
+    fn kept_differences<S: Simd, T: Sample>(&self, simd: S, weights: &Weights, lane: usize, all: &[T]) -> f32x4<S> {
+        let mut sums = f32x16::splat(simd, 0.0);
+        for (row, index) in self.rows_of(&weights.cube(lane)).into_iter().enumerate() {
+            let weight = by_difference(simd, weights.row(simd, lane, row));
             sums += weight * four_differences(simd, all, index);
         }
-        let [x, y, z, _] = of_voxels(simd, sums);
-        let [total, ..] = of_voxels(simd, total);
-        f32x4::load_array(simd, [x, y, z, total])
+        of_voxels(simd, sums)
     }
 
     /// The same sums of the same numbers, where differences are not kept.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn new_differences<S: Simd>(&self, simd: S, cube: &Cube, rows: &RowWeights) -> f32x4<S> {
+    fn new_differences<S: Simd>(&self, simd: S, weights: &Weights, lane: usize) -> f32x4<S> {
+        let cube = weights.cube(lane);
         let (values, dims, [step_y, step_z]) = (self.volume.values(), self.extent.dims, self.steps());
         let is_inside = cube.first.cmpgt(UVec3::ZERO).all() && (cube.first + SIDE as u32).cmplt(dims).all();
         let neighbours = Neighbours::of(values, dims, [1, step_y, step_z]);
-        let (along, squared) = (f32x4::load_array(simd, rows.along), f32x4::load_array(simd, rows.squared));
         let zero = f32x4::splat(simd, 0.0);
         let four = |at: usize| f32x4::load_array(simd, values.run(at));
-        let [mut total, mut x, mut y, mut z] = [zero; 4];
-        for (row, index) in self.rows_of(cube).into_iter().enumerate() {
-            let is_near = squared.simd_lt(f32x4::splat(simd, rows.limits[row]));
-            let weight = is_near.select(along * rows.across[row], zero);
-            total += weight;
+        let [mut x, mut y, mut z] = [zero; 3];
+        for (row, index) in self.rows_of(&cube).into_iter().enumerate() {
+            let weight = weights.row(simd, lane, row);
             if is_inside {
                 x += weight * (four(index + 1) - four(index - 1));
                 y += weight * (four(index + step_y) - four(index - step_y));
@@ -190,7 +216,7 @@ impl Field<'_> {
                 z += weight * f32x4::load_array(simd, [a[2], b[2], c[2], d[2]]);
             }
         }
-        let [a, b, c, d] = transposed([x, y, z, total]);
+        let [a, b, c, d] = transposed([x, y, z, zero]);
         (a + c) + (b + d)
     }
 
@@ -207,32 +233,22 @@ impl Field<'_> {
         rows
     }
 
-    /// `Σ (c - f)·g·δ / N`, given f.
+    /// `Σ (c - f)·g·δ` of one of eight points, given f.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn cube_moments<S: Simd>(
-        &self,
-        simd: S,
-        cubes: &Eight,
-        weights: &Weights,
-        lane: usize,
-        number: f32,
-    ) -> [f32; 3] {
+    pub(super) fn cube_moments<S: Simd>(&self, simd: S, weights: &Weights, lane: usize, number: f32) -> [f32; 3] {
         let [step_y, step_z] = self.steps();
-        let first = cubes.indices[lane] as usize;
-        let [to_x, to_y] = offsets(simd, cubes, lane);
+        let first = weights.cube(lane).index;
+        let [to_x, to_y] = offsets(simd, &weights.cubes, lane);
         let zero = f32x16::splat(simd, 0.0);
-        let (mut total, mut x, mut y, mut z) = (zero, zero, zero, zero);
+        let (mut x, mut y, mut z) = (zero, zero, zero);
         for plane in 0..SIDE {
-            let weight = weights.at(simd, lane, plane);
-            total += weight;
             let c = rows(simd, self.coefficients, first + plane * step_z, step_y) - self.base;
-            let weighted = weight * (c * self.scale - number);
+            let weighted = weights.plane(simd, lane, plane) * (c * self.scale - number);
             x += weighted * to_x;
             y += weighted * to_y;
-            z += weighted * weights.z[lane][plane];
+            z += weighted * (weights.cubes.rest[2][lane] - plane as f32);
         }
-        let per_weight = 1.0 / sum_of(total);
-        [sum_of(x) * per_weight, sum_of(y) * per_weight, sum_of(z) * per_weight]
+        [sum_of(x), sum_of(y), sum_of(z)]
     }
 
     /// Steps in memory along y and z.
@@ -245,7 +261,7 @@ impl Field<'_> {
 
 /// The number of each of a row's four voxels for each of their three differences.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn by_difference<S: Simd>(simd: S, of_voxels: [f32; SIDE]) -> f32x16<S> {
+fn by_difference<S: Simd>(simd: S, four: f32x4<S>) -> f32x16<S> {
     const BYTES: [u8; 64] = {
         let mut bytes = [0; 64];
         let mut at = 0;
@@ -256,7 +272,6 @@ fn by_difference<S: Simd>(simd: S, of_voxels: [f32; SIDE]) -> f32x16<S> {
         }
         bytes
     };
-    let four = f32x4::load_array(simd, of_voxels);
     let eight = four.combine(four);
     eight.combine(eight).swizzle_dyn_within_blocks(u8x64::load_array_ref(simd, &BYTES))
 }
@@ -296,12 +311,12 @@ fn side_by_side<T: Sample>(all: &[T], at: usize, step: usize) -> [f32; SIDE * SI
     [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p].map(T::to_f32)
 }
 
-/// The sums of four voxels' x, y and z, which lie side by side.
+/// The sums of four voxels' x, y and z, which lie side by side, and some number.
 #[cfg_attr(not(debug_assertions), inline(always))]
-fn of_voxels<S: Simd>(simd: S, numbers: f32x16<S>) -> [f32; 4] {
+fn of_voxels<S: Simd>(simd: S, numbers: f32x16<S>) -> f32x4<S> {
     let numbers = numbers.to_array();
     let voxel = |at: usize| f32x4::from_slice(simd, &numbers[3 * at..3 * at + 4]);
-    ((voxel(0) + voxel(2)) + (voxel(1) + voxel(3))).to_array()
+    (voxel(0) + voxel(2)) + (voxel(1) + voxel(3))
 }
 
 /// Four sums of four of sixteen numbers each.

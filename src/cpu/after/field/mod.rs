@@ -9,10 +9,10 @@ mod rows;
 
 use std::f64::consts::LOG2_E;
 
-use cube::{RowWeights, Weights};
+pub(super) use cube::Weights;
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
-use glam::{DVec3, UVec3};
+use glam::DVec3;
 
 use super::colors::ColorsOf;
 use super::differences::Differences;
@@ -66,28 +66,6 @@ pub(super) struct Field<'a> {
     min_moment: f32,
     /// Whether 4×4×4 voxels are all that a kernel reaches, and sums of values less `base` cannot overflow.
     is_cube: bool,
-}
-
-/// 4×4×4 voxels of a volume, as a point sees them.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Cube {
-    /// The first voxel, and its index among those at hand.
-    first: UVec3,
-    index: usize,
-    /// From the first voxel to the point.
-    rest: [f32; 3],
-}
-
-impl Cube {
-    /// One of eight.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn of(Eight { cells: [x, y, z], rest, indices }: &Eight, lane: usize) -> Self {
-        Self {
-            first: UVec3::new(x[lane] as u32, y[lane] as u32, z[lane] as u32),
-            index: indices[lane] as usize,
-            rest: [rest[0][lane], rest[1][lane], rest[2][lane]],
-        }
-    }
 }
 
 /// The largest power of two that is at most a normal positive number.
@@ -159,12 +137,7 @@ impl<'a> Field<'a> {
     /// The cubes around eight points of a plane, as near as the volume's borders allow: voxels of a cube that the kernel does not reach have no
     /// weight. `None` if kernels reach beyond.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn cubes<S: Simd>(
-        &self,
-        simd: S,
-        (points, low_pass): &(Points, LowPass),
-        at: [usize; 2],
-    ) -> Option<Eight> {
+    fn cubes<S: Simd>(&self, simd: S, (points, low_pass): &(Points, LowPass), at: [usize; 2]) -> Option<Eight> {
         let side = cube::SIDE as i32;
         if !(self.is_cube && low_pass.is_identity) {
             return None;
@@ -172,7 +145,7 @@ impl<'a> Field<'a> {
         Some(points.eight(simd, &self.extent, [1, side - 1], at))
     }
 
-    /// f, as numbers, at those of eight points of a plane that have a bit; NaN where there is no value.
+    /// f, as numbers, at those of eight points of a plane that have a bit; NaN where there is no value. `weights` are those that the plane keeps.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn values<S: Simd>(
         &self,
@@ -180,19 +153,13 @@ impl<'a> Field<'a> {
         of: &(Points, LowPass),
         [column, row]: [usize; 2],
         lanes: u32,
+        weights: &mut Weights,
     ) -> [f32; LANES] {
         let mut values = [f32::NAN; LANES];
         let mut left = lanes;
         if let Some(cubes) = self.cubes(simd, of, [column, row]) {
-            let of_cubes = Weights::new(simd, self, &cubes, lanes);
-            let (mut weights, mut sums) = ([[0.0; cube::SIDE]; LANES], [[0.0; cube::SIDE]; LANES]);
-            for lane in bits(lanes.into()) {
-                let lane = lane as usize;
-                let [weight, sum] = self.cube_sums(simd, &cubes, &of_cubes, lane);
-                weight.store_array(&mut weights[lane]);
-                sum.store_array(&mut sums[lane]);
-            }
-            let (weight, sum) = (cube::sums_of(simd, &weights), cube::sums_of(simd, &sums) * self.scale);
+            let sums = weights.find::<_, true>(simd, self, cubes, [column, row], lanes);
+            let (weight, sum) = (weights.totals(simd), cube::sums_of(simd, &sums) * self.scale);
             let has_value = weight.simd_ge(f32x8::splat(simd, MIN_WEIGHT));
             has_value.select(sum / weight, f32x8::splat(simd, f32::NAN)).store_array(&mut values);
             // Where the sum is not finite a hole is near.
@@ -215,13 +182,19 @@ impl<'a> Field<'a> {
         [column, row]: [usize; 2],
         lanes: u32,
         numbers: &[f32; LANES],
+        weights: &mut Weights,
     ) -> [[f32; LANES]; 3] {
         let mut gradients = [[0.0; LANES]; 3];
         let mut left = lanes;
-        if let Some(cubes) = self.cubes(simd, of, [column, row]) {
+        let mut has_weights = weights.are_known([column, row], lanes);
+        if !has_weights && let Some(cubes) = self.cubes(simd, of, [column, row]) {
+            weights.find::<_, false>(simd, self, cubes, [column, row], lanes);
+            has_weights = true;
+        }
+        if has_weights {
             gradients = match self.gradient {
-                Gradient::Differences => self.cubes_differences(simd, &cubes, lanes),
-                Gradient::Kernel => self.cubes_moments(simd, &cubes, lanes, numbers),
+                Gradient::Differences => self.cubes_differences(simd, weights, lanes),
+                Gradient::Kernel => self.cubes_moments(simd, weights, lanes, numbers),
             };
             // Where the sum is not finite a hole is near.
             let [x, y, z] = gradients.each_ref().map(|component| f32x8::load_array_ref(simd, component));
@@ -242,32 +215,33 @@ impl<'a> Field<'a> {
 
     /// `Σ d·g / N` of the points that have a bit.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cubes_differences<S: Simd>(&self, simd: S, cubes: &Eight, lanes: u32) -> [[f32; LANES]; 3] {
-        let mut weights = [const { RowWeights::NONE }; LANES];
-        for lane in bits(lanes.into()) {
-            let lane = lane as usize;
-            weights[lane] = RowWeights::new(simd, self, Cube::of(cubes, lane).rest);
-        }
+    fn cubes_differences<S: Simd>(&self, simd: S, weights: &Weights, lanes: u32) -> [[f32; LANES]; 3] {
         let mut sums = [[0.0; cube::SIDE]; LANES];
         for lane in bits(lanes.into()) {
             let lane = lane as usize;
-            self.cube_differences(simd, &Cube::of(cubes, lane), &weights[lane]).store_array(&mut sums[lane]);
+            self.cube_differences(simd, weights, lane).store_array(&mut sums[lane]);
         }
-        let [x, y, z, total] = columns(simd, sums.each_ref());
-        let per_weight = f32x8::splat(simd, 0.5 * self.scale) / total;
+        let [x, y, z, _] = columns(simd, sums.each_ref());
+        let per_weight = f32x8::splat(simd, 0.5 * self.scale) / weights.totals(simd);
         let [per_x, per_y, per_z] = self.per_spacing;
         [x * per_weight * per_x, y * per_weight * per_y, z * per_weight * per_z].map(|of| of.to_array())
     }
 
     /// The kernel's gradients of the points that have a bit.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cubes_moments<S: Simd>(&self, simd: S, cubes: &Eight, lanes: u32, numbers: &[f32; LANES]) -> [[f32; LANES]; 3] {
-        let weights = Weights::new(simd, self, cubes, lanes);
+    fn cubes_moments<S: Simd>(
+        &self,
+        simd: S,
+        weights: &Weights,
+        lanes: u32,
+        numbers: &[f32; LANES],
+    ) -> [[f32; LANES]; 3] {
+        let per_weight = (1.0 / weights.totals(simd)).to_array();
         let mut gradients = [[0.0; LANES]; 3];
         for lane in bits(lanes.into()) {
             let lane = lane as usize;
-            let moments = self.cube_moments(simd, cubes, &weights, lane, numbers[lane]);
-            let gradient = self.kernel_gradient(moments);
+            let moments = self.cube_moments(simd, weights, lane, numbers[lane]);
+            let gradient = self.kernel_gradient(moments.map(|moment| moment * per_weight[lane]));
             (0..3).for_each(|axis| gradients[axis][lane] = gradient[axis]);
         }
         gradients
@@ -347,11 +321,12 @@ mod tests {
                 let at = points.of(lane, 0);
                 let of = (points, low_pass);
                 let (number, [gradient, kept]) = dispatch!(Level::new(), simd => {
-                    let numbers = ours.values(simd, &of, [0, 0], 1 << lane);
-                    let gradient = |field: &Field<'_>| {
-                        field.gradients(simd, &of, [0, 0], 1 << lane, &numbers).map(|component| component[lane])
+                    let mut weights = Weights::new();
+                    let numbers = ours.values(simd, &of, [0, 0], 1 << lane, &mut weights);
+                    let gradient = |field: &Field<'_>, weights: &mut Weights| {
+                        field.gradients(simd, &of, [0, 0], 1 << lane, &numbers, weights).map(|component| component[lane])
                     };
-                    (numbers[lane], [gradient(&ours), gradient(&keeping)])
+                    (numbers[lane], [gradient(&ours, &mut weights), gradient(&keeping, &mut Weights::new())])
                 });
                 assert_eq!(kept.map(f32::to_bits), gradient.map(f32::to_bits), "{at} {sets:?}");
                 let value = expected.value(at, &twins);
