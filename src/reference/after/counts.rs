@@ -4,6 +4,8 @@
 //! radii (as widened by the low-pass rule) and a slab: of all in such a box around its brick of 4×4×4 voxels, and of all that are nearer to itself.
 //! A slab needs both of its planes, and each plane all of its voxels.
 
+use std::ops::Range;
+
 use glam::{DVec3, UVec2, UVec3};
 
 use super::Frame;
@@ -77,18 +79,17 @@ fn drawn_bricks(frame: &Frame, shares: bool) -> Vec<Vec<UVec3>> {
     let reach = reach(frame);
     let tables = tables(frame);
     let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
+    let ball = ball(reach.distance.min(WIDEST));
     let in_brick = |index: u32| {
         let first = UVec3::new(index % bricks.x, index / bricks.x % bricks.y, index / bricks.x / bricks.y) * SIDE;
         let end = (first + SIDE).min(grid.dims);
-        let shows = |ends: Option<[f64; 2]>| ends.is_some_and(|ends| meets_opacity(&tables, bearing(frame, ends)));
-        if !shows(values(frame, (first, end), reach.along, |_| true)) {
+        if !shows(frame, &tables, box_around(frame, (first, end), reach.along)) {
             return Vec::new();
         }
         let is_drawn = |&voxel: &UVec3| {
-            let squared = |other: UVec3| other.as_dvec3().distance_squared(voxel.as_dvec3());
-            let is_near = |other| squared(other) < reach.distance * reach.distance - ROUNDING;
-            let around = || values(frame, (voxel, voxel + 1), DVec3::splat(reach.distance), is_near);
-            !frame.volume.value(voxel).is_nan() && (shares || reach.distance > WIDEST || shows(around()))
+            let around = || ball.iter().filter_map(|row| row.around(frame, voxel));
+            !frame.volume.value(voxel).is_nan()
+                && (shares || reach.distance > WIDEST || shows(frame, &tables, around()))
         };
         voxels(first, end).filter(is_drawn).collect()
     };
@@ -125,22 +126,63 @@ fn tables<'a>(frame: &Frame<'a>) -> Vec<Tables<'a>> {
     labels.chain([frame.transfer.tables(None)]).collect()
 }
 
-/// The minimum and maximum of the coefficients of those voxels of a box, and up to a distance around it, that count; `None` if there are only holes.
-fn values(
-    frame: &Frame,
-    (first, end): (UVec3, UVec3),
-    reach: DVec3,
-    counts: impl Fn(UVec3) -> bool,
-) -> Option<[f64; 2]> {
+/// A row along x of the voxels that are nearer to one than a distance.
+struct BallRow {
+    /// From that voxel to the row's middle one.
+    y: i32,
+    z: i32,
+    /// The voxels on either side of it.
+    half: u32,
+}
+
+/// The voxels nearer to one than a distance, itself among them.
+fn ball(distance: f64) -> Vec<BallRow> {
+    let half = distance.ceil() as i32;
+    let squared = distance * distance - ROUNDING;
+    let row = |(y, z): (i32, i32)| {
+        let left = squared - f64::from(y * y + z * z);
+        let half = (0..=half as u32).rev().find(|&x| f64::from(x * x) < left)?;
+        Some(BallRow { y, z, half })
+    };
+    (-half..=half).flat_map(|z| (-half..=half).map(move |y| (y, z))).filter_map(row).collect()
+}
+
+impl BallRow {
+    /// The indices in memory of those of its voxels that exist around a voxel.
+    fn around(&self, frame: &Frame, voxel: UVec3) -> Option<Range<u32>> {
+        let dims = frame.volume.dims();
+        let (y, z) = (voxel.y.checked_add_signed(self.y)?, voxel.z.checked_add_signed(self.z)?);
+        let row = dims.x * (y + dims.y * z);
+        let (first, last) = (voxel.x.saturating_sub(self.half), (voxel.x + self.half).min(dims.x - 1));
+        (y < dims.y && z < dims.z).then_some(row + first..row + last + 1)
+    }
+}
+
+/// The rows along x, as indices in memory, of a box of voxels and those up to a distance around it.
+fn box_around(frame: &Frame, (first, end): (UVec3, UVec3), reach: DVec3) -> impl Iterator<Item = Range<u32>> {
     let dims = frame.volume.dims();
     let low = (first.as_dvec3() - reach).ceil().max(DVec3::ZERO).as_uvec3();
     let high = (end.as_dvec3() - 1.0 + reach).floor().min(dims.as_dvec3() - 1.0).as_uvec3();
+    let rows = (low.z..=high.z).flat_map(move |z| (low.y..=high.y).map(move |y| dims.x * (y + dims.y * z)));
+    rows.map(move |row| row + low.x..row + high.x + 1)
+}
+
+/// Whether any value between the minimum and the maximum of the coefficients of some rows of voxels may have an opacity; holes do not count.
+fn shows(frame: &Frame, tables: &[Tables], rows: impl Iterator<Item = Range<u32>>) -> bool {
     let coefficients = frame.field.coefficients();
-    let found = voxels(low, high + 1).filter(|&voxel| counts(voxel));
-    let found = found.map(|voxel| coefficients[frame.geometry.grid.index_of(voxel) as usize]);
-    // `min` and `max` ignore NaN.
-    let ends = found.fold([f64::INFINITY, f64::NEG_INFINITY], |[min, max], c| [min.min(c), max.max(c)]);
-    (ends[0] <= ends[1]).then_some(ends)
+    let mut ends = [f64::INFINITY, f64::NEG_INFINITY];
+    for row in rows {
+        let row = &coefficients[row.start as usize..row.end as usize];
+        // NaN is neither less nor greater.
+        let wider =
+            row.iter().fold(ends, |[min, max], &c| [if c < min { c } else { min }, if c > max { c } else { max }]);
+        // What a range of values shows, a wider one does too.
+        if wider != ends && meets_opacity(tables, bearing(frame, wider)) {
+            return true;
+        }
+        ends = wider;
+    }
+    false
 }
 
 /// The range in which a value with an opacity makes a brick matter: a greater value hides smaller maxima, a smaller one greater minima, and
