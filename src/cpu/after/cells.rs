@@ -82,6 +82,11 @@ impl Cells {
         self
     }
 
+    /// The bits of a cell, as they are kept.
+    pub(super) fn read(&self, index: usize) -> u8 {
+        self.bits[index]
+    }
+
     /// Of eight points, given their cells, which those beyond the volume have in common with the nearest point inside.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn of(&self, indices: [u32; 8]) -> Bits {

@@ -35,6 +35,15 @@ impl Differences {
         }
         Some(Self::Any(differences(volume, |difference| difference)))
     }
+
+    /// One of them.
+    pub(super) fn at(&self, index: usize) -> f32 {
+        match self {
+            #[cfg(not(target_arch = "wasm32"))]
+            Self::Small(all) => all[index].into(),
+            Self::Any(all) => all[index],
+        }
+    }
 }
 
 /// Whether differences of any two values, twice, are whole numbers that fit in 16 bits.

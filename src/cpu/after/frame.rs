@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU8, Ordering};
 
 use fearless_simd::prelude::*;
 use fearless_simd::{Level, dispatch};
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 
 use super::extreme::is_choice;
 use super::field::Field;
@@ -230,6 +230,18 @@ impl<'a> Frame<'a> {
     pub(super) fn touched(frames: &[Self]) -> Range<i32> {
         let touched = frames.iter().map(|frame| frame.touched.clone()).filter(|touched| !touched.is_empty());
         touched.reduce(|a, b| a.start.min(b.start)..a.end.max(b.end)).unwrap_or(0..0)
+    }
+
+    /// Reads what a box of voxels of a volume in memory, from one to before another, is drawn from: what is read counts for nothing, but is in the cache when
+    /// it is drawn.
+    pub(super) fn read_ahead(&self, (first, end): (UVec3, UVec3)) {
+        if let Matter::Whole { .. } = self.matter {
+            let cells = self.matter.cells();
+            for (z, y) in (first.z..end.z).flat_map(|z| (first.y..end.y).map(move |y| (z, y))) {
+                let index = self.field.extent.index(UVec3::new(first.x, y, z));
+                std::hint::black_box((self.field.read(index), cells.map(|cells| cells.read(index))));
+            }
+        }
     }
 
     /// Records that a tile draws one of the grid's bricks.

@@ -1,6 +1,7 @@
 //! One tile of the image, slab by slab from front to back, where classification comes after splatting (SPEC §9): the slab between two planes is
 //! classified for the open pixels whose rays enter it in a cell of a brick that may have an opacity, and composited.
 
+use std::collections::VecDeque;
 use std::iter::Peekable;
 use std::ops::Range;
 use std::sync::Arc;
@@ -21,6 +22,17 @@ use crate::cpu::project::floor;
 use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
 use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
+
+/// The number of slabs before its first one in which a brick is read, so that it is in the cache when that slab comes.
+const AHEAD: i32 = 2;
+
+/// A brick that comes next.
+struct NearBrick<'a> {
+    placed: &'a Placed,
+    /// The slab with which it ends.
+    end: i32,
+    pixels: Pixels,
+}
 
 /// The state with which a thread draws one tile after another.
 pub(super) struct TileWalk<'a> {
@@ -120,9 +132,14 @@ impl<'a> TileWalk<'a> {
     #[cfg_attr(not(debug_assertions), inline(always))]
     fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
         let mut slab = first;
+        // The bricks that come next.
+        let mut near = VecDeque::new();
         while !self.open.is_closed() {
-            while let Some(placed) = bricks.next_if(|placed| placed.first <= slab) {
-                self.arrive(placed);
+            while let Some(placed) = bricks.next_if(|placed| placed.first <= slab.saturating_add(AHEAD)) {
+                near.extend(self.approach(placed));
+            }
+            while let Some(brick) = near.pop_front_if(|brick: &mut NearBrick<'_>| brick.placed.first <= slab) {
+                self.arrive(&brick);
             }
             let mut is_idle = true;
             for Channel { active, .. } in &mut self.channels {
@@ -130,7 +147,8 @@ impl<'a> TileWalk<'a> {
                 is_idle &= active.is_empty();
             }
             if is_idle {
-                let Some(next) = bricks.peek() else { break };
+                let next = near.front().map(|brick| brick.placed).or_else(|| bricks.peek().copied());
+                let Some(next) = next else { break };
                 slab = next.first;
                 continue;
             }
@@ -144,13 +162,21 @@ impl<'a> TileWalk<'a> {
         }
     }
 
-    /// Takes in a brick, unless its pixels are opaque.
-    fn arrive(&mut self, placed: &Placed) {
+    /// Reads a brick that comes next, unless its pixels are opaque.
+    fn approach<'b>(&self, placed: &'b Placed) -> Option<NearBrick<'b>> {
         let Frame { placement, matter, .. } = self.frame;
-        let (bounds, slabs) = placement.bounds(matter.bounds(placed.brick));
-        if let Some(pixels) = pixels_of(self.origin, bounds).filter(|pixels| self.open.sees(pixels)) {
+        let voxels = matter.bounds(placed.brick);
+        let (bounds, slabs) = placement.bounds(voxels);
+        let pixels = pixels_of(self.origin, bounds).filter(|pixels| self.open.sees(pixels))?;
+        self.channels[placed.channel as usize].frame.read_ahead(voxels);
+        Some(NearBrick { placed, end: slabs.end, pixels })
+    }
+
+    /// Takes in a brick, unless its pixels are opaque.
+    fn arrive(&mut self, NearBrick { placed, end, pixels }: &NearBrick<'_>) {
+        if self.open.sees(pixels) {
             let Channel { frame, active, .. } = &mut self.channels[placed.channel as usize];
-            active.push((slabs.end, pixels));
+            active.push((*end, *pixels));
             frame.draw_brick(placed.brick);
             self.tally.bricks_visited += 1;
         }

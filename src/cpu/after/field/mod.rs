@@ -129,6 +129,11 @@ impl<'a> Field<'a> {
         if is_difference { of_value + 1.0 } else { of_value }
     }
 
+    /// What is kept of a voxel, given its index.
+    pub(super) fn read(&self, index: usize) -> (f32, Option<f32>) {
+        (self.coefficients.at(index), self.differences.map(|differences| differences.at(3 * index)))
+    }
+
     /// Whether voxels have colours of their own.
     pub(super) fn has_colors(&self) -> bool {
         self.colors.is_some()
