@@ -250,7 +250,7 @@ impl ViewGeometry {
     }
 
     /// The bounds of a box of voxels with the given middle and half size in voxel indices; `None` before the near plane.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn bounds(&self, middle: DVec3, half: DVec3) -> Option<Bounds> {
         let rows = self.screen_from_voxel;
         let [x, y, _, from_eye] = rows.map(|row| row.dot(middle.extend(1.0)));
@@ -267,7 +267,7 @@ impl ViewGeometry {
 
     /// The sheet depths that the kernels of a box of voxels reach, given its middle and half size in voxel indices. Where sheets are parallel
     /// to the image, only depths beyond the near plane count; the range is empty if the kernels reach no such depth.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn depths(&self, middle: DVec3, half: DVec3) -> Range<f64> {
         let [_, _, depth, from_eye] = self.screen_from_voxel.map(|row| row.dot(middle.extend(1.0)));
         let [_, _, spread, thickness] = self.screen_from_voxel.map(|row| row.truncate().abs().dot(half));
@@ -309,7 +309,7 @@ impl ViewGeometry {
 
     /// Half the screen box in pixels around the footprints, of a radius in grid units, that kernels leave on the screen between two planes of
     /// sheet depth (§6). In perspective it bounds all of them; it is infinite where they may cover the whole screen.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn half_box(&self, support: f64, planes: Range<f64>) -> DVec2 {
         let Some(Perspective { eye, aspect, .. }) = &self.perspective else {
             return self.footprint.half_box(support);

@@ -138,7 +138,10 @@ impl<'a> TileWalk<'a> {
             while let Some(placed) = bricks.next_if(|placed| placed.first <= slab.saturating_add(AHEAD)) {
                 near.extend(self.approach(placed));
             }
-            while let Some(brick) = near.pop_front_if(|brick: &mut NearBrick<'_>| brick.placed.first <= slab) {
+            let is_here = |brick: &NearBrick<'_>| brick.placed.first <= slab;
+            while near.front().is_some_and(is_here)
+                && let Some(brick) = near.pop_front()
+            {
                 self.arrive(&brick);
             }
             let mut is_idle = true;

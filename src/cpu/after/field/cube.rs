@@ -70,10 +70,9 @@ impl Weights {
         self.at == at && lanes & !self.known == 0
     }
 
-    /// Computes those of the points that have a bit, and with `HAS_SUMS` returns `Σ (c - base)·g` of each as four numbers to be added. Not finite if a hole is
-    /// near.
+    /// Computes those of the points that have a bit, and returns `Σ (c - base)·g` of each as four numbers to be added. Not finite if a hole is near.
     #[cfg_attr(not(debug_assertions), inline(always))]
-    pub(super) fn find<S: Simd, const HAS_SUMS: bool>(
+    pub(super) fn find<S: Simd>(
         &mut self,
         simd: S,
         field: &Field<'_>,
@@ -112,10 +111,8 @@ impl Weights {
                 let weight = is_inside.select(in_plane * along[lane][z], zero);
                 weight.store_array(&mut planes[lane][z]);
                 total += weight;
-                if HAS_SUMS {
-                    let c = rows(simd, field.coefficients, first + z * step_z, step_y) - field.base;
-                    sum += weight * c;
-                }
+                let c = rows(simd, field.coefficients, first + z * step_z, step_y) - field.base;
+                sum += weight * c;
             }
             quarters(total).store_array(&mut totals[lane]);
             quarters(sum).store_array(&mut sums[lane]);

@@ -18,7 +18,7 @@ use super::colors::ColorsOf;
 use super::differences::Differences;
 use super::held::{Extent, Held};
 use super::low_pass::LowPass;
-use super::planes::{Eight, Points};
+use super::planes::Points;
 use crate::after::normalization::Normalization;
 use crate::cpu::count::bits;
 use crate::cpu::vector::{LANES, columns};
@@ -139,15 +139,24 @@ impl<'a> Field<'a> {
         self.colors.is_some()
     }
 
-    /// The cubes around eight points of a plane, as near as the volume's borders allow: voxels of a cube that the kernel does not reach have no
-    /// weight. `None` if kernels reach beyond.
-    #[cfg_attr(not(debug_assertions), inline(always))]
-    fn cubes<S: Simd>(&self, simd: S, (points, low_pass): &(Points, LowPass), at: [usize; 2]) -> Option<Eight> {
-        let side = cube::SIDE as i32;
+    /// Finds the weights of those of eight points of a plane that have a bit, in cubes as near as the volume's borders allow: voxels of a cube that the
+    /// kernel does not reach have no weight. Returns what [`Weights::find`] does; `None` if kernels reach beyond cubes.
+    // Twice in a program, which is faster, but once in a page, whose code must be short.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(any(target_arch = "wasm32", debug_assertions)), inline(always))]
+    fn find_weights<S: Simd>(
+        &self,
+        simd: S,
+        (points, low_pass): &(Points, LowPass),
+        at: [usize; 2],
+        lanes: u32,
+        weights: &mut Weights,
+    ) -> Option<[[f32; cube::SIDE]; LANES]> {
         if !(self.is_cube && low_pass.is_identity) {
             return None;
         }
-        Some(points.eight(simd, &self.extent, [1, side - 1], at))
+        let cubes = points.eight(simd, &self.extent, [1, cube::SIDE as i32 - 1], at);
+        Some(weights.find(simd, self, cubes, at, lanes))
     }
 
     /// f, as numbers, at those of eight points of a plane that have a bit; NaN where there is no value. `weights` are those that the plane keeps.
@@ -162,8 +171,7 @@ impl<'a> Field<'a> {
     ) -> [f32; LANES] {
         let mut values = [f32::NAN; LANES];
         let mut left = lanes;
-        if let Some(cubes) = self.cubes(simd, of, [column, row]) {
-            let sums = weights.find::<_, true>(simd, self, cubes, [column, row], lanes);
+        if let Some(sums) = self.find_weights(simd, of, [column, row], lanes, weights) {
             let (weight, sum) = (weights.totals(simd), cube::sums_of(simd, &sums) * self.scale);
             let has_value = weight.simd_ge(f32x8::splat(simd, MIN_WEIGHT));
             has_value.select(sum / weight, f32x8::splat(simd, f32::NAN)).store_array(&mut values);
@@ -191,12 +199,9 @@ impl<'a> Field<'a> {
     ) -> [[f32; LANES]; 3] {
         let mut gradients = [[0.0; LANES]; 3];
         let mut left = lanes;
-        let mut has_weights = weights.are_known([column, row], lanes);
-        if !has_weights && let Some(cubes) = self.cubes(simd, of, [column, row]) {
-            weights.find::<_, false>(simd, self, cubes, [column, row], lanes);
-            has_weights = true;
-        }
-        if has_weights {
+        if weights.are_known([column, row], lanes)
+            || self.find_weights(simd, of, [column, row], lanes, weights).is_some()
+        {
             gradients = match self.gradient {
                 Gradient::Differences => self.cubes_differences(simd, weights, lanes),
                 Gradient::Kernel => self.cubes_moments(simd, weights, lanes, numbers),
