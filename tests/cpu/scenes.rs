@@ -12,8 +12,8 @@ use super::{bits, draw};
 
 /// A change of a scene.
 fn change(scene: &mut Scene, random: &mut Random) {
-    let Splatting { classification, compositing, interpolation, radius, .. } = &mut scene.splatting;
-    match random.bits() % 9 {
+    let Splatting { classification, compositing, interpolation, radius, slab_width, .. } = &mut scene.splatting;
+    match random.bits() % 10 {
         0 => {
             let direction = DVec3::new(random.uniform(-1.0, 1.0), random.uniform(0.2, 1.0), random.uniform(-1.0, 1.0));
             scene.camera = Camera { direction, ..scene.camera };
@@ -35,6 +35,7 @@ fn change(scene: &mut Scene, random: &mut Random) {
             ]);
         }
         7 => *interpolation = random.pick(&[Interpolation::Smooth, Interpolation::Exact]),
+        8 => *slab_width = random.pick(&[0.3, 0.5, 1.0]),
         _ => *radius = random.pick(&[1.5, 2.0]),
     }
 }
@@ -51,9 +52,10 @@ fn a_changed_scene_is_drawn_as_a_new_one() {
     for step in 0..60 {
         change(&mut scene, &mut random);
         renderer.set_scene(&scene).unwrap();
-        let image = renderer.draw().unwrap().image;
-        assert_eq!(bits(&image), bits(&draw(&volume, &scene).image), "step {step}: {scene:?}");
-        images.insert(bits(&image));
+        let [drawn, new] = [renderer.draw().unwrap(), draw(&volume, &scene)];
+        assert_eq!(bits(&drawn.image), bits(&new.image), "step {step}: {scene:?}");
+        assert_eq!(drawn.stats.counts, new.stats.counts, "step {step}: {scene:?}");
+        images.insert(bits(&drawn.image));
     }
     assert!(images.len() > 30, "only {} images", images.len());
     // A scene that is refused changes nothing.
