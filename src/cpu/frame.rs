@@ -90,7 +90,7 @@ impl Clone for Reused {
 }
 
 impl Reused {
-    /// Draws the frame of a view, as [`Frame::new`].
+    /// Draws the frame of a view in this memory; the arguments are those of [`Frame::new`].
     pub(super) fn draw(
         &mut self,
         (grid, voxels): (&Grid, Voxels<'_>),

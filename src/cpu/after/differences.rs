@@ -12,7 +12,7 @@ pub(super) const MAX_VOXELS: u64 = 1 << 24;
 /// are whole numbers, so are these, and if they fit in 16 bits they take half the memory.
 #[derive(Clone, Debug)]
 pub(super) enum Differences {
-    /// Whole numbers. There are none on web pages, where all values are kept as `f32`.
+    /// Differences that are whole numbers. Web pages are compiled without this variant, because they keep all values as `f32`.
     #[cfg(not(target_arch = "wasm32"))]
     Small(Vec<i16>),
     /// NaN beside a hole.

@@ -44,7 +44,7 @@ pub(in crate::cpu::after) struct Weights {
 }
 
 impl Weights {
-    /// None.
+    /// Memory for weights, none of which is known.
     pub(in crate::cpu::after) fn new() -> Self {
         let (in_plane, along) = ([[0.0; SIDE * SIDE]; LANES], [[0.0; SIDE]; LANES]);
         Self {
@@ -60,7 +60,7 @@ impl Weights {
         }
     }
 
-    /// Forgets them.
+    /// Makes all weights unknown.
     pub(in crate::cpu::after) fn clear(&mut self) {
         self.known = 0;
     }
