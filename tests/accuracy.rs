@@ -61,7 +61,7 @@ impl Worst {
 #[test]
 fn psnr_against_the_reference() {
     let devices =
-        VARIANTS.map(|(_, _, _, format, _)| GpuHeadless::new(&common::lavapipe().with_sheet_format(format)).unwrap());
+        VARIANTS.map(|(_, _, _, format, _)| GpuHeadless::new(&common::on_adapter().with_sheet_format(format)).unwrap());
     let head = builtin::volume("head:24").unwrap();
     // A translucent skin and a denser skull, shaded, give gradients of many lengths and sums of many sheets.
     let mut scene = scene(96, 80);

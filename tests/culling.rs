@@ -19,7 +19,7 @@ use sheetsplat::volume::{Volume, builtin};
 use common::compare::assert_at_most;
 use common::images::largest_difference;
 use common::{
-    DRAWINGS, Drawing, FORMS, RASTERIZERS, Random, SPACINGS, camera, lavapipe, random_eye, random_volume, scene,
+    DRAWINGS, Drawing, FORMS, RASTERIZERS, Random, SPACINGS, camera, on_adapter, random_eye, random_volume, scene,
     transfer,
 };
 
@@ -32,7 +32,7 @@ const ROUNDING: f64 = 2e-5;
 const NATIVE_RATIO: f64 = 1.3;
 
 fn headless(sheets_per_group: Option<u32>) -> GpuHeadless {
-    let mut options = lavapipe();
+    let mut options = on_adapter();
     options.sheets_per_group = sheets_per_group;
     GpuHeadless::new(&options).unwrap()
 }
@@ -323,7 +323,7 @@ fn profiled_frames() {
     (scene.image.width, scene.image.height) = (40, 40);
     scene.splatting.slab_width = 0.05;
     let devices = [false, true]
-        .map(|profile| GpuHeadless::new(&lavapipe().with_sheets_per_group(1).with_profile(profile)).unwrap());
+        .map(|profile| GpuHeadless::new(&on_adapter().with_sheets_per_group(1).with_profile(profile)).unwrap());
     for (rasterizer, stages) in [
         (Rasterizer::Quads, &["composite", "cull", "resolve", "splat"][..]),
         (Rasterizer::Tiles, &["gather", "resolve"]),

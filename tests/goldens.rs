@@ -1,12 +1,15 @@
 //! Small pictures of the builtin volumes, compared with those in `tests/goldens`.
 //!
 //! The native backend makes them, and draws every byte of them again on any machine, with every instruction set that it has (or with the one that
-//! `SHEETSPLAT_SIMD` names). Each rasterizer on Mesa's lavapipe is held to them with a tolerance:
+//! `SHEETSPLAT_SIMD` names). Each rasterizer on Mesa's lavapipe (or on the adapter that `SHEETSPLAT_TEST_ADAPTER` names) is held to them with a tolerance:
 //! f32 sums are taken in other orders there, and lavapipe's approximate reciprocals differ between processors. A failing picture and its
 //! differences are left in `target/goldens`. `SHEETSPLAT_BLESS=all`, or the names of scenes separated by commas, rewrites the goldens that fail, and only those.
 #![cfg(all(feature = "golden", feature = "cpu"))]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+#[cfg(feature = "gpu")]
+#[path = "common/adapter.rs"]
+mod adapter;
 mod golden_scenes;
 
 use std::path::{Path, PathBuf};
@@ -156,6 +159,7 @@ mod gpu {
     use sheetsplat::scene::Scene;
     use sheetsplat::settings::{Classification, FootprintForm, Rasterizer};
 
+    use super::adapter::adapter;
     use super::{COLORS, SCENES, colors, failures, scene};
 
     /// The steps of 255 by which a channel of the GPU's pictures may differ.
@@ -175,7 +179,7 @@ mod gpu {
 
     #[test]
     fn the_gpus_pictures_look_like_the_goldens() {
-        let options = HeadlessOptions::default().with_adapter("llvmpipe");
+        let options = HeadlessOptions::default().with_adapter(adapter());
         let gpu = GpuHeadless::new(&options)
             .unwrap_or_else(|error| panic!(".ci/setup --lavapipe installs what is missing: {error}"));
         let tolerance = Tolerance::new(TOLERANCE, OUTLIERS).unwrap();

@@ -22,12 +22,13 @@ use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 use sheetsplat::{DeviceError, DeviceRequirements, InsufficientLimit};
 
+use common::adapter::adapter;
 use common::compare::{self, assert_at_least, assert_at_most};
 use common::images::{largest_difference, rms};
 use common::{COMPOSITINGS, F16, F32, gpu, scene, transfer};
 
 fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>) -> Result<GpuHeadless, DeviceError> {
-    let mut options = common::lavapipe().with_requirements(DeviceRequirements { features, limits });
+    let mut options = common::on_adapter().with_requirements(DeviceRequirements { features, limits });
     options.sheet_format = sheet_format;
     GpuHeadless::new(&options)
 }
@@ -72,7 +73,7 @@ fn rgba32float_sheets_take_the_default_limits_too() {
     let gpu = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     assert_eq!(gpu.renderer().sheet_format(), TextureFormat::Rgba32Float);
     // Every device allows 32 bytes of colour attachments, which are two such sheets.
-    let pairs = GpuHeadless::new(&common::lavapipe().with_sheets_per_group(2)).unwrap();
+    let pairs = GpuHeadless::new(&common::on_adapter().with_sheets_per_group(2)).unwrap();
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = Rasterizer::Quads;
     let renderings = [gpu, pairs].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
@@ -96,7 +97,7 @@ fn attachments_limit_the_sheets_of_a_group() {
         gpu.render_volume(volume.clone(), &scene).unwrap().stats.counts
     };
     let fixed = |sheets: u32| {
-        let options = common::lavapipe().with_sheets_per_group(sheets);
+        let options = common::on_adapter().with_sheets_per_group(sheets);
         GpuHeadless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap().stats.counts
     };
     let of = [1, 2, 4].map(fixed);
@@ -325,7 +326,7 @@ fn limits_beyond_the_adapter_are_an_error_that_names_it() {
 #[test]
 fn deterministic_options_do_not_depend_on_the_device() {
     let requirements = DeviceRequirements { features: Features::empty(), limits: Limits::default() };
-    let options = HeadlessOptions::DETERMINISTIC.with_adapter("llvmpipe");
+    let options = HeadlessOptions::DETERMINISTIC.with_adapter(adapter());
     let (volume, scene) = head();
     let renderings = [options.clone().with_requirements(requirements), options]
         .map(|options| GpuHeadless::new(&options).unwrap().render_volume(volume.clone(), &scene).unwrap());

@@ -15,7 +15,7 @@ use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::PollType;
 use sheetsplat::{GpuVolume, SceneView};
 
-use common::{FORMS, RASTERIZERS, gpu, gpu_with_small_bindings, lavapipe, new_gpu, scene, transfer};
+use common::{FORMS, RASTERIZERS, gpu, gpu_with_small_bindings, new_gpu, on_adapter, scene, transfer};
 
 fn head(size: u32) -> (Volume, Scene) {
     let mut scene = scene(60, 50);
@@ -109,7 +109,7 @@ fn a_volumes_bytes_are_known_before() {
 #[test]
 fn a_frames_bytes_are_known_before() {
     let [roomy, small] = [new_gpu(), gpu_with_small_bindings(64 << 10)];
-    let profiling = GpuHeadless::new(&lavapipe().with_profile(true)).unwrap();
+    let profiling = GpuHeadless::new(&on_adapter().with_profile(true)).unwrap();
     let (volume, base) = head(40);
     let mut scenes = Vec::new();
     for (rasterizer, footprint) in FORMS {

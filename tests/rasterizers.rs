@@ -18,7 +18,7 @@ use sheetsplat::wgpu::{Features, Limits};
 
 use common::compare::assert_at_least;
 use common::images::{BLACK, psnr};
-use common::{BY_AMOUNTS, RASTERIZERS, Random, gpu, lavapipe, scene, transfer};
+use common::{BY_AMOUNTS, RASTERIZERS, Random, gpu, on_adapter, scene, transfer};
 
 fn head() -> (Volume, Scene) {
     let mut scene = scene(90, 75);
@@ -30,7 +30,7 @@ fn head() -> (Volume, Scene) {
 /// A device with only these features.
 fn open(features: Features) -> GpuHeadless {
     let requirements = DeviceRequirements { features, limits: Limits::default() };
-    GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap()
+    GpuHeadless::new(&on_adapter().with_requirements(requirements)).unwrap()
 }
 
 /// The rasterizer that drew a frame.
@@ -111,7 +111,7 @@ fn settings_that_require_tiles_are_refused_without_them() {
     refused(&open(Features::SUBGROUP), &tiles, &["\"tiles\"", "barriers", "\"quads\""]);
     let limits = Limits { max_compute_workgroup_storage_size: 16383, ..Limits::default() };
     let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
-    let little = GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap();
+    let little = GpuHeadless::new(&on_adapter().with_requirements(requirements)).unwrap();
     refused(&little, &tiles, &["max_compute_workgroup_storage_size", "16383", "16384", "\"quads\""]);
     let parallelogram = with(|scene| scene.splatting.footprint_box = FootprintBox::Parallelogram);
     refused(&none, &parallelogram, &["\"tiles\"", "subgroups"]);
@@ -168,7 +168,7 @@ fn small_bindings_change_no_bit_of_tiles() {
     let [full, small] = [Limits::default().max_storage_buffer_binding_size, 200 << 10].map(|bytes| {
         let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
         let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
-        GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap()
+        GpuHeadless::new(&on_adapter().with_requirements(requirements)).unwrap()
     });
     assert_eq!(CompositingBuffer::bands(&small.device().limits(), [300, 200]).unwrap().len(), 7);
     for order in [Order::FrontToBack, Order::BackToFront] {

@@ -14,7 +14,7 @@ use sheetsplat::{DeviceRequirements, GpuVolume, Image, Scene, SceneView};
 
 use super::common::compare::{assert_at_least, assert_at_most, decibels};
 use super::common::images::{largest_difference, rms};
-use super::common::{COMPOSITINGS, RASTERIZERS, Random, camera, gpu, lavapipe, scene, transfer};
+use super::common::{COMPOSITINGS, RASTERIZERS, Random, camera, gpu, on_adapter, scene, transfer};
 use super::{BY_SUMS, CLASSIFICATIONS, draw, joined, random_case, set_transfers, single};
 
 fn by(rasterizer: Rasterizer, scene: &Scene) -> Scene {
@@ -409,7 +409,7 @@ fn first_channels(volume: &Volume, scene: &Scene, count: usize) -> (Volume, Scen
 fn four_channels_keep_within_webgpus_default_limits() {
     let least = |features| {
         let requirements = DeviceRequirements { features, limits: Limits::default() };
-        GpuHeadless::new(&lavapipe().with_requirements(requirements)).unwrap()
+        GpuHeadless::new(&on_adapter().with_requirements(requirements)).unwrap()
     };
     let [with_f16, with_f32] = [Features::empty(), Features::FLOAT32_BLENDABLE].map(least);
     assert_eq!(with_f16.renderer().sheet_format(), TextureFormat::Rgba16Float);

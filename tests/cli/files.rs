@@ -244,7 +244,7 @@ fn unprivileged(folder: &Folder, arguments: &str) -> Command {
     let program = folder.path("sheetsplat");
     assert!(Command::new("cp").arg(env!("CARGO_BIN_EXE_sheetsplat")).arg(&program).status().unwrap().success());
     let mut command = Command::new(program);
-    command.env("WGPU_ADAPTER_NAME", "llvmpipe").args(arguments.split(' ')).current_dir(folder.path(""));
+    command.env("WGPU_ADAPTER_NAME", adapter()).args(arguments.split(' ')).current_dir(folder.path(""));
     command.uid(65534).gid(65534);
     command
 }
@@ -355,7 +355,7 @@ fn long_orbit(folder: &Folder, before: &str) -> Command {
     let script = format!("{before}exec '{program}' orbit {SMALL} --count 1000000 -o turn.apng");
     command
         .args(["--default-signal", "sh", "-c", &script])
-        .env("WGPU_ADAPTER_NAME", "llvmpipe")
+        .env("WGPU_ADAPTER_NAME", adapter())
         .current_dir(folder.path(""));
     command
 }

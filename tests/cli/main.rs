@@ -39,6 +39,7 @@ use std::process::Command;
 use glam::DVec3;
 use serde_json::Value;
 
+use common::adapter::adapter;
 use common::compare::{assert_at_least, assert_at_most};
 use common::images::{BLACK, psnr};
 use common::shared::shared;
@@ -115,7 +116,7 @@ impl Folder {
 
     fn command(&self, arguments: &str) -> Command {
         let mut command = Command::new(env!("CARGO_BIN_EXE_sheetsplat"));
-        command.env("WGPU_ADAPTER_NAME", "llvmpipe").args(arguments.split(' ')).current_dir(&self.0);
+        command.env("WGPU_ADAPTER_NAME", adapter()).args(arguments.split(' ')).current_dir(&self.0);
         command
     }
 

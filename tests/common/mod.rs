@@ -1,5 +1,6 @@
 //! Helpers that several tests share.
 
+pub(crate) mod adapter;
 pub(crate) mod compare;
 pub(crate) mod images;
 pub(crate) mod shared;
@@ -18,6 +19,8 @@ use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer, Splatting};
 use sheetsplat::volume::{Grid, Volume};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
+
+use adapter::adapter;
 
 /// The maximum relative error of rounding to the nearest f32.
 pub(crate) const F32: f64 = 1.0 / (1 << 24) as f64;
@@ -85,9 +88,9 @@ pub(crate) fn drawn_forms() -> impl Iterator<Item = (Drawing, FootprintForm)> {
     FORMS.into_iter().map(|(rasterizer, form)| (Drawing::By(rasterizer), form)).chain([native])
 }
 
-/// Mesa's software driver, on which the tests compare images, so that results are the same on every machine.
-pub(crate) fn lavapipe() -> HeadlessOptions {
-    HeadlessOptions::default().with_adapter("llvmpipe")
+/// The options of a device on the adapter that the tests draw on.
+pub(crate) fn on_adapter() -> HeadlessOptions {
+    HeadlessOptions::default().with_adapter(adapter())
 }
 
 /// A device as the program opens it, with f32 sheets. All tests of a process share it, because compiling its pipelines takes longer than most tests do. The
@@ -99,16 +102,16 @@ pub(crate) fn gpu() -> &'static GpuHeadless {
 
 /// Such a device for one test alone.
 pub(crate) fn new_gpu() -> GpuHeadless {
-    let options = lavapipe().with_sheet_format(TextureFormat::Rgba32Float);
-    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
+    let options = on_adapter().with_sheet_format(TextureFormat::Rgba32Float);
+    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("the adapter that the tests draw on: {error}"))
 }
 
 /// A device with WebGPU's default limits, except that storage bindings have at most `bytes` bytes.
 pub(crate) fn gpu_with_small_bindings(bytes: u64) -> GpuHeadless {
     let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
     let requirements = DeviceRequirements { features: Features::FLOAT32_BLENDABLE, limits };
-    let options = lavapipe().with_requirements(requirements).with_sheet_format(TextureFormat::Rgba32Float);
-    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("these tests need Mesa's lavapipe: {error}"))
+    let options = on_adapter().with_requirements(requirements).with_sheet_format(TextureFormat::Rgba32Float);
+    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("the adapter that the tests draw on: {error}"))
 }
 
 /// Four f32 per pixel, as read back.

@@ -7,7 +7,7 @@ use sheetsplat::settings::Projection;
 use sheetsplat::volume::builtin;
 
 use crate::common::compare::assert_at_most;
-use crate::common::{BY_MEANS, DRAWINGS, Drawing, RASTERIZERS, Random, drawn_forms, gpu, lavapipe, scene};
+use crate::common::{BY_MEANS, DRAWINGS, Drawing, RASTERIZERS, Random, drawn_forms, gpu, on_adapter, scene};
 use crate::{OUTLIERS, random_case, render, share_off};
 
 /// Behind a surface everything is culled, and the image does not change.
@@ -44,7 +44,7 @@ fn surfaces_cull_and_the_others_do_not() {
 /// The image does not depend on how sheets are grouped and which tiles are composited.
 #[test]
 fn tiles_and_groups_change_nothing() {
-    let renderers = [1, 2, 4].map(|n| GpuHeadless::new(&lavapipe().with_sheets_per_group(n)).unwrap());
+    let renderers = [1, 2, 4].map(|n| GpuHeadless::new(&on_adapter().with_sheets_per_group(n)).unwrap());
     let mut random = Random(91);
     for (case, compositing) in (0..12).zip(BY_MEANS.into_iter().cycle()) {
         let (volume, mut scene) = random_case(&mut random);
