@@ -4,6 +4,8 @@
 #[expect(dead_code, reason = "not every file needs all of it")]
 mod common;
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use glam::{DVec3, UVec3};
 use sheetsplat::headless::GpuHeadless;
 use sheetsplat::scene::Scene;
@@ -23,6 +25,12 @@ fn head(size: u32) -> (Volume, Scene) {
     (builtin::volume(&format!("head:{size}")).unwrap(), scene)
 }
 
+/// Held by a test as long as it runs, because all of them count what the same device has allocated.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// The bytes that wgpu has allocated, once the device is idle.
 fn allocated(gpu: &GpuHeadless) -> u64 {
     gpu.device().poll(PollType::wait_indefinitely()).unwrap();
@@ -32,6 +40,7 @@ fn allocated(gpu: &GpuHeadless) -> u64 {
 /// 200 renders on one device, of 5 volumes and 40 sizes, by both rasterizers.
 #[test]
 fn memory_is_freed() {
+    let _alone = alone();
     let gpu = gpu();
     let volumes = [8, 12, 16, 20, 24].map(head);
     let mut held = Vec::new();
@@ -55,6 +64,7 @@ fn memory_is_freed() {
 /// A view that grows and shrinks uses at most 4 times what a new one uses, and frees all of it.
 #[test]
 fn a_view_that_shrinks_frees_memory() {
+    let _alone = alone();
     let gpu = gpu();
     for rasterizer in RASTERIZERS {
         let (volume, mut scene) = head(16);
@@ -78,6 +88,7 @@ fn a_view_that_shrinks_frees_memory() {
 /// The estimate is exact for volumes of part of a row, a row, several, and several layers, with values of one, two or four bytes.
 #[test]
 fn a_volumes_bytes_are_known_before() {
+    let _alone = alone();
     let gpu = gpu();
     for dims in [[3, 5, 7], [2048, 1, 1], [2049, 1, 1], [64, 64, 65], [2048, 2049, 1]] {
         let dims = UVec3::from(dims);
@@ -108,6 +119,7 @@ fn a_volumes_bytes_are_known_before() {
 /// The estimate is exact before anything of a frame is allocated, for each rasterizer, several brick lists and bands of rows.
 #[test]
 fn a_frames_bytes_are_known_before() {
+    let _alone = alone();
     let [roomy, small] = [new_gpu(), gpu_with_small_bindings(64 << 10)];
     let profiling = GpuHeadless::new(&on_adapter().with_profile(true)).unwrap();
     let (volume, base) = head(40);
@@ -167,6 +179,7 @@ fn fresh(gpu: &GpuHeadless, view: &SceneView) -> u64 {
 /// After changes with and without room for the added bricks.
 #[test]
 fn a_changed_views_bytes_are_known_before() {
+    let _alone = alone();
     let gpu = gpu();
     let (volume, mut scene) = head(40);
     scene.transfer.iso_ranges = Some(vec![[100.0, 110.0]]);
@@ -189,6 +202,7 @@ fn a_changed_views_bytes_are_known_before() {
 /// A host can bind the texture of first hits once; later frames keep it, and nothing more.
 #[test]
 fn first_hits_stay_where_they_are() {
+    let _alone = alone();
     let gpu = gpu();
     for rasterizer in RASTERIZERS {
         let (volume, mut scene) = head(16);

@@ -10,7 +10,7 @@ use sheetsplat::headless::GpuHeadless;
 use sheetsplat::internals::gpu::device::{DeviceRequirements, TILE_FEATURES};
 use sheetsplat::internals::gpu::targets::CompositingBuffer;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::settings::{Classification, Gradient};
 use sheetsplat::settings::{FootprintBox, FootprintForm, Method, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
@@ -73,6 +73,26 @@ fn auto_chooses_tiles_where_they_are_supported() {
     assert_eq!(drawn_by(&subgroups, &volume, &scene), "quads");
 }
 
+/// Where a subgroup is a workgroup, barriers of workgroups serve as well.
+#[test]
+fn tiles_need_no_barriers_of_subgroups() {
+    let [of_subgroups, of_workgroups] = [TILE_FEATURES, Features::SUBGROUP].map(open);
+    let (volume, mut scene) = head();
+    scene.splatting.rasterizer = Rasterizer::Tiles;
+    // Perspective and thin slabs, so that voxels of a group wait for room in the queue.
+    scene.camera =
+        Camera { projection: Projection::Perspective { fov_y: 40.0, distance: None, near: None }, ..scene.camera };
+    scene.splatting.slab_width = 2.0;
+    for classification in [Classification::Before, Classification::After] {
+        scene.splatting.classification = classification;
+        let [expected, actual] =
+            [&of_subgroups, &of_workgroups].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
+        assert!(expected.image.pixels.iter().any(|pixel| pixel[3] > 0.5), "{classification:?}");
+        assert!(actual.image == expected.image, "{classification:?}");
+        assert_eq!(actual.stats.counts, expected.stats.counts, "{classification:?}");
+    }
+}
+
 /// After splatting, sums with the kernel's gradient and those of colours need more workgroup memory than WebGPU's default. Quads draw them there.
 #[test]
 fn quads_draw_what_tiles_do_not_after_splatting() {
@@ -108,7 +128,6 @@ fn settings_that_require_tiles_are_refused_without_them() {
     };
     let tiles = with(|scene| scene.splatting.rasterizer = Rasterizer::Tiles);
     refused(&none, &tiles, &["\"tiles\"", "subgroups", "\"quads\""]);
-    refused(&open(Features::SUBGROUP), &tiles, &["\"tiles\"", "barriers", "\"quads\""]);
     let limits = Limits { max_compute_workgroup_storage_size: 16383, ..Limits::default() };
     let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
     let little = GpuHeadless::new(&on_adapter().with_requirements(requirements)).unwrap();

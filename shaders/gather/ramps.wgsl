@@ -1,6 +1,6 @@
 // Ramps whose first control points are distributed among the lanes of a subgroup.
 //
-// Needs gather/patch.wgsl: control_points, lane, lanes.
+// Needs gather/patch.wgsl: THREADS, control_points, lane, lanes.
 // Needs shared/shading.wgsl: between.
 
 // A ramp: the range of its control points, and this lane's share of the first of them.
@@ -15,8 +15,14 @@ fn ramp_at(held: Ramp, value: f32) -> vec3f {
     let count = held.end - held.first;
     // The number of points at or below the value.
     var below = 0u;
-    below += select(0u, 16u, lanes >= 32u && is_below(held, below + 15u, value));
-    below += select(0u, 8u, lanes >= 16u && is_below(held, below + 7u, value));
+    if THREADS >= 32u {
+        let is_past = is_below(held, below + 15u, value);
+        below += select(0u, 16u, lanes >= 32u && is_past);
+    }
+    if THREADS >= 16u {
+        let is_past = is_below(held, below + 7u, value);
+        below += select(0u, 8u, lanes >= 16u && is_past);
+    }
     below += select(0u, 4u, is_below(held, below + 3u, value));
     below += select(0u, 2u, is_below(held, below + 1u, value));
     below += select(0u, 1u, is_below(held, below, value));
@@ -31,9 +37,11 @@ fn is_long(held: Ramp) -> bool {
     return held.end - held.first > lanes;
 }
 
-// Whether one of the first control points is at or below a value.
+// Whether one of the first control points is at or below a value. All lanes read another's point, also those that search behind the last one: a GPU gives
+// nothing defined from lanes that do not take part.
 fn is_below(held: Ramp, at: u32, value: f32) -> bool {
-    return at < min(held.end - held.first, lanes) && subgroupShuffle(held.own.x, at % lanes) <= value;
+    let point = subgroupShuffle(held.own.x, at % lanes);
+    return at < min(held.end - held.first, lanes) && point <= value;
 }
 
 fn ramp_of(first: u32, end: u32) -> Ramp {

@@ -67,12 +67,15 @@ fn gradient_at(voxel: vec3u) -> Gradient {
 
 // A gradient given by its half, value per `unit`.
 fn gradient_of(g: vec3f) -> Gradient {
-    // Scaled first, because squares leave the range of f32 long before the gradient does.
+    // Scaled first, because squares leave the range of f32 long before the gradient does: by a power of two, as GPUs divide by at most 2¹²⁶. The largest
+    // component comes to lie between 2 and 4.
     let largest = max(max(abs(g.x), abs(g.y)), abs(g.z));
-    let direction = g / select(1.0, largest, largest > 0.0);
+    let exponent = max(bitcast<u32>(largest) & 0x7f800000u, 0x800000u);
+    let scale = bitcast<f32>(exponent - 0x800000u);
+    let direction = g * bitcast<f32>(0x7f800000u - exponent);
     let size = length(direction);
     // Multiplied in this order, the product leaves the range of f32 only if the magnitude does.
-    let magnitude = (largest * frame.per_unit) * (2.0 * size * frame.per_unit);
+    let magnitude = (scale * frame.per_unit) * (2.0 * size * frame.per_unit);
     if magnitude < frame.gradient.w {
         return Gradient(vec3f(0.0), 0.0);
     }

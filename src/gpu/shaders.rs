@@ -7,6 +7,8 @@ pub struct Shader {
     pub stage: &'static str,
     /// The parts of the source in order: each file's path below `shaders/`, and its text.
     pub files: &'static [(&'static str, &'static str)],
+    /// Whether barriers of subgroups are barriers of workgroups instead, each of which must be one subgroup.
+    pub has_workgroup_barriers: bool,
 }
 
 macro_rules! shader {
@@ -17,6 +19,7 @@ macro_rules! shader {
                 $((concat!($file, ".wgsl"), text!($file)),)*
                 (concat!($stage, ".wgsl"), text!($stage)),
             ],
+            has_workgroup_barriers: false,
         }
     };
 }
@@ -339,7 +342,8 @@ impl Shader {
 
     /// The complete WGSL.
     pub fn source(&self) -> String {
-        self.files.iter().map(|&(_, text)| text).collect()
+        let source: String = self.files.iter().map(|&(_, text)| text).collect();
+        if self.has_workgroup_barriers { source.replace("subgroupBarrier", "workgroupBarrier") } else { source }
     }
 
     /// Compiles the shader.

@@ -132,9 +132,9 @@ pub enum Rasterizer {
     Auto,
     /// Footprint quads, drawn into sheet buffers (§3.2).
     Quads,
-    /// A compute stage in which every tile gathers its sections front to back. It needs
-    /// [`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES) with 4 to 64 threads, 16 KiB of workgroup memory (WebGPU's default), and the
-    /// summed-area form.
+    /// A compute stage in which every tile gathers its sections front to back. It needs subgroups of 4 to 64 threads
+    /// ([`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES); barriers for them only if they differ in size and some have fewer than 32), 16 KiB of workgroup
+    /// memory (WebGPU's default), and the summed-area form.
     Tiles,
 }
 

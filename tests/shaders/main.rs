@@ -1,6 +1,8 @@
 //! The shaders parse, validate as WebGPU core (except one), and need no more than WebGPU's default limits. Needs no GPU.
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod lanes;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
@@ -23,8 +25,9 @@ fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
         let line = error.location(&shader.source()).map(|location| location.line_number);
         failed(line, error.emit_to_string_with_path(&shader.source(), shader.stage))
     })?;
-    let of_subgroups = Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER;
-    let subgroups = if WITH_SUBGROUPS.contains(shader) { of_subgroups } else { Capabilities::empty() };
+    let barriers = if shader.has_workgroup_barriers { Capabilities::empty() } else { Capabilities::SUBGROUP_BARRIER };
+    let has_subgroups = WITH_SUBGROUPS.iter().any(|of_subgroups| of_subgroups.stage == shader.stage);
+    let subgroups = if has_subgroups { Capabilities::SUBGROUP | barriers } else { Capabilities::empty() };
     let info = Validator::new(ValidationFlags::all(), WEBGPU_CORE | subgroups).validate(&module).map_err(|error| {
         let line = error.location(&shader.source()).map(|location| location.line_number);
         failed(line, error.emit_to_string_with_path(&shader.source(), shader.stage))
@@ -57,7 +60,9 @@ fn assert_none(failures: &[String]) {
 
 #[test]
 fn every_shader_validates() {
-    let failures: Vec<_> = shaders::ALL.iter().filter_map(|shader| validated(shader).err()).collect();
+    let of_workgroups = WITH_SUBGROUPS.map(|shader| Shader { has_workgroup_barriers: true, ..shader });
+    let all = shaders::ALL.iter().chain(&of_workgroups);
+    let failures: Vec<_> = all.filter_map(|shader| validated(shader).err()).collect();
     assert_none(&failures);
 }
 
@@ -69,6 +74,7 @@ fn errors_name_the_file_and_the_line() {
             ("shared/one.wgsl", "fn first() {}\n\n"),
             ("broken.wgsl", "fn second() {}\nfn third() { nothing(); }\n"),
         ],
+        has_workgroup_barriers: false,
     };
     let error = validated(&broken).unwrap_err();
     assert!(error.starts_with("shaders/broken.wgsl:2: "), "{error}");
