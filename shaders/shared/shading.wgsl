@@ -8,12 +8,6 @@ fn between(a: vec4f, b: vec4f, value: f32) -> vec3f {
     return mix(a.yzw, b.yzw, t);
 }
 
-// An eighth of a number, by its exponent's bits: drivers take a common factor out of a difference. 0 if the eighth is not normal.
-fn eighth(number: f32) -> f32 {
-    let bits = bitcast<u32>(number);
-    return select(0.0, bitcast<f32>(bits - 0x1800000u), (bits & 0x7f800000u) > 0x1800000u);
-}
-
 // The amount per unit length, m of SPEC §5.
 fn amount(alpha: f32) -> f32 {
     if frame.compositing != EXPONENTIAL {
@@ -55,6 +49,8 @@ fn shade(color: vec3f, gradient: Gradient, lighting: Lighting) -> vec3f {
     }
     let n = gradient.normal;
     let diffuse = frame.shading.y * abs(dot(n, lighting.light));
-    let highlight = frame.shading.z * pow(min(abs(dot(n, lighting.half_vector)), 1.0), frame.shading.w);
+    let cosine = min(abs(dot(n, lighting.half_vector)), 1.0);
+    // Of 0 a driver's power may be NaN.
+    let highlight = frame.shading.z * select(0.0, pow(cosine, frame.shading.w), cosine > 0.0);
     return clamp(color * (ambient + diffuse) + highlight, vec3f(0.0), vec3f(1.0));
 }

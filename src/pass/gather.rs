@@ -345,14 +345,16 @@ pub fn min_workgroup_bytes(planes: Option<PlaneMode>) -> u32 {
     NO_COLORS_BYTES + pixel_bytes(planes) + 64 * voxel_bytes(planes)
 }
 
-/// The number of voxels in a workgroup's queue, which has the memory that the patch's pixels leave. On a GPU more than [`WORKGROUP_BYTES`] would
-/// keep workgroups from running side by side.
+/// The maximum workgroup memory in bytes. On GPUs it is [`WORKGROUP_BYTES`]: an NVIDIA H100 (driver 580.159.04) draws nothing in some of the modes that need more, and no
+/// other GPU has been tried. More would keep workgroups from running side by side there, too.
+pub fn most_workgroup_bytes(device: &Device) -> u32 {
+    let most = device.limits().max_compute_workgroup_storage_size;
+    if device.adapter_info().device_type == DeviceType::Cpu { most } else { most.min(WORKGROUP_BYTES) }
+}
+
+/// The number of voxels in a workgroup's queue, which has the memory that the patch's pixels leave.
 fn queue(device: &Device, mode: GatherMode) -> u32 {
-    let bytes = match device.adapter_info().device_type {
-        DeviceType::Cpu => device.limits().max_compute_workgroup_storage_size.min(2 * WORKGROUP_BYTES),
-        _ => WORKGROUP_BYTES,
-    };
-    let bytes = bytes.max(min_workgroup_bytes(mode.planes));
+    let bytes = most_workgroup_bytes(device).min(2 * WORKGROUP_BYTES).max(min_workgroup_bytes(mode.planes));
     (bytes - NO_COLORS_BYTES - pixel_bytes(mode.planes)) / voxel_bytes(mode.planes) / 32 * 32
 }
 

@@ -24,6 +24,7 @@ use crate::image::channels::Joining;
 use crate::kernel::Kernel;
 use crate::lists::patch_bins::SHEETS;
 use crate::pass::composite::RayMode;
+use crate::pass::gather::most_workgroup_bytes;
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::shading::Gradient;
@@ -55,6 +56,8 @@ pub(crate) struct FrameRequest {
     pub(crate) fallback: Option<RenderError>,
     /// The number of threads in the device's smallest subgroups.
     pub(crate) subgroup_threads: u32,
+    /// The bytes of workgroup memory that tiles may use.
+    pub(crate) workgroup_bytes: u32,
     /// The bands of the compositing buffer.
     pub(crate) bands: Vec<Band>,
     /// Of classification after splatting.
@@ -149,6 +152,7 @@ impl FrameRequest {
             kind,
             fallback,
             subgroup_threads: device.adapter_info().subgroup_min_size,
+            workgroup_bytes: most_workgroup_bytes(device),
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),
             ramps,

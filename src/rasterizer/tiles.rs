@@ -9,6 +9,7 @@ use super::carried::Carried;
 use super::patch_ranges::{Dispatch, patch_ranges, range_stride};
 use super::{FrameEstimate, FrameInputs, Prepared};
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
 use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, sizes, written};
@@ -345,7 +346,7 @@ impl TileBuffers<BufferSpec> {
         (bins, results): (&PatchBins, &GatheredLayout),
         are_joined: bool,
     ) -> Result<Self, RenderError> {
-        check_workgroup_memory(limits, request)?;
+        check_workgroup_memory(request)?;
         let (binding, storage) = (binding(limits), BufferUsages::STORAGE);
         let within = |what, required: u64| {
             let (limit, actual) = ("max_storage_buffer_binding_size", binding);
@@ -415,12 +416,13 @@ fn plane_mode(request: &FrameRequest) -> Option<PlaneMode> {
 }
 
 /// Checks that a patch's pixels fit into a workgroup's memory, of which sums with the kernel's gradient need most.
-fn check_workgroup_memory(limits: &Limits, request: &FrameRequest) -> Result<(), RenderError> {
-    let required = u64::from(min_workgroup_bytes(plane_mode(request)));
-    let actual = u64::from(limits.max_compute_workgroup_storage_size);
-    if required > actual {
-        let (what, limit) = ("the tile rasterizer's sums", "max_compute_workgroup_storage_size");
-        return Err(RenderError::Limit { what, limit, required, actual });
+fn check_workgroup_memory(request: &FrameRequest) -> Result<(), RenderError> {
+    let (required, most) = (min_workgroup_bytes(plane_mode(request)), request.workgroup_bytes);
+    if required > most {
+        let found = format!("\"tiles\" with sums of {required} bytes of workgroup memory");
+        let allowed =
+            format!("at most {most} (max_compute_workgroup_storage_size, on GPUs no more than 16384), or \"quads\"");
+        return Err(SettingError::new("splatting.rasterizer", found, allowed).into());
     }
     Ok(())
 }
