@@ -348,8 +348,11 @@ pub fn min_workgroup_bytes(planes: Option<PlaneMode>) -> u32 {
 /// The maximum workgroup memory in bytes. On GPUs it is [`WORKGROUP_BYTES`]: an NVIDIA H100 (driver 580.159.04) draws nothing in some of the modes that need more, and no
 /// other GPU has been tried. More would keep workgroups from running side by side there, too.
 pub fn most_workgroup_bytes(device: &Device) -> u32 {
-    let most = device.limits().max_compute_workgroup_storage_size;
-    if device.adapter_info().device_type == DeviceType::Cpu { most } else { most.min(WORKGROUP_BYTES) }
+    most_bytes_of(device.adapter_info().device_type, device.limits().max_compute_workgroup_storage_size)
+}
+
+fn most_bytes_of(device_type: DeviceType, limit: u32) -> u32 {
+    if device_type == DeviceType::Cpu { limit } else { limit.min(WORKGROUP_BYTES) }
 }
 
 /// The number of voxels in a workgroup's queue, which has the memory that the patch's pixels leave.
@@ -387,5 +390,24 @@ impl GatherBand {
     /// Bytes of GPU memory.
     pub fn gpu_bytes(&self) -> u64 {
         self.next.iter().map(Buffer::size).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gpus_draw_sums_of_at_most_16_kib() {
+        let sums = |gradient, own_colors| {
+            min_workgroup_bytes(Some(PlaneMode { gradient, exact: true, layers: 16, own_colors }))
+        };
+        for kind in [DeviceType::DiscreteGpu, DeviceType::IntegratedGpu, DeviceType::VirtualGpu, DeviceType::Other] {
+            let most = most_bytes_of(kind, 49152);
+            assert!(min_workgroup_bytes(None) <= most && sums(Gradient::Differences, false) <= most, "{kind:?}");
+            assert!(sums(Gradient::Kernel, false) > most && sums(Gradient::Differences, true) > most, "{kind:?}");
+            assert_eq!(most_bytes_of(kind, 8192), 8192, "{kind:?}");
+        }
+        assert_eq!(most_bytes_of(DeviceType::Cpu, 32768), 32768);
     }
 }
