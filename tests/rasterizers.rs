@@ -79,7 +79,7 @@ fn tiles_need_no_barriers_of_subgroups() {
     let [of_subgroups, of_workgroups] = [TILE_FEATURES, Features::SUBGROUP].map(open);
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = Rasterizer::Tiles;
-    // Perspective and thin slabs, so that voxels of a group wait for room in the queue.
+    // Thick slabs, so that a group has more voxels than the queue holds, and they wait for room in it.
     scene.camera =
         Camera { projection: Projection::Perspective { fov_y: 40.0, distance: None, near: None }, ..scene.camera };
     scene.splatting.slab_width = 2.0;

@@ -134,7 +134,7 @@ pub enum Rasterizer {
     Quads,
     /// A compute stage in which every tile gathers its sections front to back. It needs subgroups of 4 to 64 threads
     /// ([`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES); barriers for them only if they differ in size and some have fewer than 32), 16 KiB of workgroup
-    /// memory (WebGPU's default), and the summed-area form. After splatting, sums with the kernel's gradient or colours need more, which is used of software drivers only.
+    /// memory (WebGPU's default), and the summed-area form. After splatting, sums with the kernel's gradient or colours need 18 to 30 KiB, which tiles use on software drivers only.
     Tiles,
 }
 
