@@ -251,7 +251,8 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
             held = with_record(held, i, now.carried);
             held_colors = with_color(held_colors, i, now.carried_color);
         } else {
-            left &= ~select(0u, 0x1111u << i, !is_open(now.image));
+            let tested = (at / (4u * SHEETS_PER_TEST) + 1u) * 4u * SHEETS_PER_TEST;
+            left &= ~select(0u, (0x1111u << i) & (0xffffu << tested), !is_open(now.image));
         }
     }
     passes += subgroupMax(count) * gather.search_passes;
@@ -319,6 +320,9 @@ fn may_show(slab: Slab, part: vec2f, image: vec4f) -> bool {
     let is_among = has_opacity(slab, table_at(slab.at, 0.5 * (part.x + part.y), 0.0)) || (LABELS && COMPOSITING == SURFACE);
     return is_open(image) && is_seen && is_among;
 }
+
+// The number of sheets after which pixels are tested for being opaque.
+override SHEETS_PER_TEST: u32 = 1u;
 
 fn is_open(image: vec4f) -> bool {
     return frame.culling == 0u || image.a < frame.opacity_threshold;

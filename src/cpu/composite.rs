@@ -25,7 +25,7 @@ pub(super) struct Compositor {
 }
 
 impl Compositor {
-    /// Composites a sheet that begins at `begin`, empties it, and closes the pixels that became opaque; the number of tiles
+    /// Composites a sheet that begins at `begin`, empties it, and finds the pixels that became opaque; the number of tiles
     /// as statistics count them (SPEC §8) in which there was anything to composite.
     #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn composite<S: Simd>(
@@ -46,7 +46,6 @@ impl Compositor {
         };
         let has_empty = matches!(self.compositing, Compositing::Surface | Compositing::Minimum);
         let tiles = tiles_of(rows & open.rows());
-        let mut has_closed = false;
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
             rows &= rows - 1;
@@ -59,14 +58,7 @@ impl Compositor {
                 };
                 opaque |= self.vector(simd, pixels, buffers, (rays, begin), [row, vector * LANES]);
             }
-            let opaque = opaque & open.row(row);
-            if opaque != 0 {
-                open.close(row, opaque);
-                has_closed = true;
-            }
-        }
-        if has_closed {
-            open.join();
+            open.find(row, opaque);
         }
         tiles
     }

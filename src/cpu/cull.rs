@@ -20,6 +20,9 @@ pub(super) struct OpenMask {
     joined: [[u32; ROWS]; LEVELS],
     /// The bits of the rows that lie in the image.
     rows: u64,
+    /// The pixels found to be opaque that are still open: the bits of their rows, and of their columns.
+    found_rows: u64,
+    found: [u32; ROWS],
 }
 
 /// The pixels of a tile whose centres lie within a box: first and last column and row. Never empty.
@@ -92,7 +95,8 @@ impl OpenMask {
     /// The first columns and rows of a tile.
     pub(super) fn new(columns: usize, rows: usize) -> Self {
         let bits = u32::MAX >> (COLUMNS - columns);
-        let mut mask = Self { joined: [[0; ROWS]; LEVELS], rows: u64::MAX >> (u64::BITS as usize - rows) };
+        let rows_in_image = u64::MAX >> (u64::BITS as usize - rows);
+        let mut mask = Self { joined: [[0; ROWS]; LEVELS], rows: rows_in_image, found_rows: 0, found: [0; ROWS] };
         mask.joined[0][..rows].fill(bits);
         mask.join();
         mask
@@ -134,7 +138,33 @@ impl OpenMask {
         self.joined[0][row] &= !opaque;
     }
 
+    /// Notes open pixels of a row as opaque, which stay open until [`Self::close_found`].
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn find(&mut self, row: usize, opaque: u32) {
+        let found = opaque & self.row(row);
+        if found != 0 {
+            self.found[row] |= found;
+            self.found_rows |= 1 << row;
+        }
+    }
+
+    /// Closes the pixels that were found to be opaque.
+    #[cfg_attr(not(debug_assertions), inline(always))]
+    pub(super) fn close_found(&mut self) {
+        if self.found_rows == 0 {
+            return;
+        }
+        while self.found_rows != 0 {
+            let row = self.found_rows.trailing_zeros() as usize;
+            self.found_rows &= self.found_rows - 1;
+            let found = std::mem::take(&mut self.found[row]);
+            self.close(row, found);
+        }
+        self.join();
+    }
+
     /// Computes the joined rows again.
+    #[cfg_attr(not(debug_assertions), inline(always))]
     pub(super) fn join(&mut self) {
         for level in 1..LEVELS {
             let step = 1 << (level - 1);

@@ -160,6 +160,7 @@ impl Projection {
     }
 
     /// The sheets that a voxel's kernel overlaps, in the order in which they are composited; none before the near plane.
+    #[inline]
     pub(super) fn sheets(&self, place: Place, voxel: UVec3) -> Range<i32> {
         match &self.view.perspective {
             Some(perspective) => self.sheets_of_eye(perspective, (place.depth, place.from_eye), voxel.as_dvec3()),
@@ -303,6 +304,7 @@ impl Projection {
     }
 
     /// How a voxel's kernel is seen from an eye.
+    #[inline]
     pub(super) fn lens(&self, perspective: &Perspective, place: Place, voxel: UVec3) -> Lens {
         let view = &self.view;
         let Perspective { eye, eye_voxel, aspect, is_image_aligned, .. } = perspective;

@@ -209,6 +209,7 @@ impl<'a> TileWalk<'a> {
                 }
                 let begin = rays.begin(frame.projection.direction * sheet);
                 let tiles = frame.compositor.composite(simd, &mut ring.sheet(sheet), buffers, (rays, begin), open);
+                open.close_found();
                 if frame.touched.contains(&sheet) {
                     tally.tiles_composited += tiles;
                 }

@@ -17,7 +17,7 @@ use crate::gpu::shaders::{self, Shader};
 use crate::gpu::volume_texture::{OwnColors, VolumeTexture};
 use crate::lists::patch_bins::{PATCH, SHEETS};
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::{Classification, Compositing, FootprintBox, Order, Splatting};
+use crate::settings::splatting::{Classification, Compositing, FootprintBox, Order, Splatting, sheets_per_test};
 
 /// The stage's pipelines, each compiled when it is first needed.
 #[derive(Debug, Default)]
@@ -43,6 +43,8 @@ pub struct GatherMode {
     rays: RayMode,
     /// How values are gathered on slab planes; `None` if colours are.
     planes: Option<PlaneMode>,
+    /// The number of a group's sheets after which values' pixels are tested for being opaque.
+    sheets_per_test: u32,
     /// Whether the blocks of a patch are divided among workgroups.
     divided: bool,
 }
@@ -84,6 +86,7 @@ impl GatherMode {
         // In perspective every voxel has its own parallelogram.
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
         let divided = workgroups > 1;
+        let sheets_per_test = planes.map_or(SHEETS, |_| sheets_per_test(splatting.slab_width));
         let (channels, full_color) = (1, 0);
         Self {
             compositing,
@@ -97,6 +100,7 @@ impl GatherMode {
             full_color,
             rays,
             planes,
+            sheets_per_test,
             divided,
         }
     }
@@ -268,6 +272,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
                 ("SUMS", f64::from(planes.sums())),
                 ("SAVED", f64::from(planes.sums() * SHEETS * PATCH_THREADS)),
                 ("LAYER_SHEETS", f64::from(planes.layer_sheets())),
+                ("SHEETS_PER_TEST", f64::from(mode.sheets_per_test)),
                 ("QUEUE_COLORS", f64::from(if planes.own_colors { queue(device, mode) } else { 1 })),
             ]);
             shaders::GATHER_PLANES

@@ -21,6 +21,15 @@ pub(crate) fn check_first_hit(opacity: f64) -> Result<(), SettingError> {
 /// The maximum falloff for [`Classification::After`]: beyond it, no kernel reaches the middle between eight voxels.
 const MAX_FALLOFF_AFTER: f64 = 11.0;
 
+/// The maximum of [`sheets_per_test`]: the sheets of a group that tiles draw on a GPU.
+const MOST_SHEETS_PER_TEST: f64 = 4.0;
+
+/// The number of sheets after which pixels are tested for being opaque, if each stops by itself ([`Classification::After`]): a small group of sheets (§6), of
+/// one `unit` in depth at most. A test after every thin sheet would stop pixels in the middle of a surface, just beyond the threshold.
+pub(crate) fn sheets_per_test(slab_width: f64) -> u32 {
+    (1.0 / slab_width).clamp(1.0, MOST_SHEETS_PER_TEST) as u32
+}
+
 /// The minimum of the kernel's discrete transform, relative to its maximum, for [`Interpolation::Exact`]; below it, coefficients would
 /// amplify noise without bound.
 const MIN_RESPONSE: f64 = 0.002;

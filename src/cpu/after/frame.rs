@@ -32,7 +32,7 @@ use crate::parallel::prelude::*;
 use crate::part::Resolver;
 use crate::scene::Scene;
 use crate::settings::shading::MIN_GRADIENT;
-use crate::settings::splatting::{Classification, Compositing, Order};
+use crate::settings::splatting::{Classification, Compositing, Order, sheets_per_test};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::Counts;
@@ -53,6 +53,8 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) integrals: Integrals,
     pub(super) shader: Shader,
     pub(super) compositor: Compositor,
+    /// After as many sheets opaque pixels are closed.
+    pub(super) sheets_per_test: i32,
     pub(super) rays: RayMode,
     /// By brick of a grid in memory: [`WANTED`], [`DRAWN`], or 0.
     drawn: Vec<AtomicU8>,
@@ -135,6 +137,7 @@ impl<'a> Frame<'a> {
                 threshold: (splatting.culling && can_hide).then_some(splatting.opacity_threshold as f32),
                 first_hit: first_hit.map(|opacity| opacity as f32),
             },
+            sheets_per_test: sheets_per_test(splatting.slab_width) as i32,
             rays: RayMode::within(&view, &grid, counted(&view, &scene.clip, &grid), surfaces),
             drawn,
             compositing: splatting.compositing,

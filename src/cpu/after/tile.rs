@@ -152,17 +152,26 @@ impl<'a> TileWalk<'a> {
             if is_idle {
                 let next = near.front().map(|brick| brick.placed).or_else(|| bricks.peek().copied());
                 let Some(next) = next else { break };
-                slab = next.first;
+                slab = self.go_on(slab, next.first);
                 continue;
             }
             self.enter(slab);
             if let Some(end) = self.blank_until(slab) {
-                slab = end;
+                slab = self.go_on(slab, end);
                 continue;
             }
             self.composite(simd, slab);
-            slab += 1;
+            slab = self.go_on(slab, slab + 1);
         }
+    }
+
+    /// Goes on from a slab to another one, and closes the opaque pixels at the end of a group of sheets. Returns the other slab.
+    fn go_on(&mut self, from: i32, to: i32) -> i32 {
+        let group_of = |slab: i32| slab.div_euclid(self.frame.sheets_per_test);
+        if group_of(from) != group_of(to) {
+            self.open.close_found();
+        }
+        to
     }
 
     /// Reads a brick that comes next, unless its pixels are opaque.
