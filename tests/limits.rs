@@ -27,8 +27,10 @@ use common::compare::{self, assert_at_least, assert_at_most};
 use common::images::{largest_difference, rms};
 use common::{COMPOSITINGS, F16, F32, gpu, scene, transfer};
 
+/// A device with these limits and features that draws by quads, which need least.
 fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>) -> Result<GpuHeadless, DeviceError> {
-    let mut options = common::on_adapter().with_requirements(DeviceRequirements { features, limits });
+    let options = common::on_adapter().with_requirements(DeviceRequirements { features, limits });
+    let mut options = options.with_rasterizer(Rasterizer::Quads);
     options.sheet_format = sheet_format;
     GpuHeadless::new(&options)
 }
@@ -122,7 +124,6 @@ fn small_bindings_split_voxels_and_image() {
     let volume = builtin::volume("head:64").unwrap();
     let voxels = classify(&volume, &scene.transfer.resolve(&volume), &ClippedVoxels::default());
     let bricks = BrickList::new(volume.grid(), &voxels);
-    // Without subgroups, so that quads draw.
     let full = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     // 32 rows of 150 pixels are 75 KiB, so a band has one or two rows of tiles.
     for (bytes, bands) in [(76 << 10, 4), (150 << 10, 2)] {

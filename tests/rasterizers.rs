@@ -6,13 +6,13 @@ mod common;
 
 use glam::{DVec3, UVec3};
 use sheetsplat::RenderError;
-use sheetsplat::headless::GpuHeadless;
+use sheetsplat::headless::{GpuHeadless, Rendering};
 use sheetsplat::internals::gpu::device::{DeviceRequirements, TILE_FEATURES};
 use sheetsplat::internals::gpu::targets::CompositingBuffer;
-use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Camera, Projection};
-use sheetsplat::settings::{Classification, Gradient};
-use sheetsplat::settings::{FootprintBox, FootprintForm, Method, Order, Rasterizer};
+use sheetsplat::scene::{Channel, Scene, VolumeSource};
+use sheetsplat::settings::Projection;
+use sheetsplat::settings::{Classification, Compositing, Gradient, Interpolation};
+use sheetsplat::settings::{Economies, FootprintBox, FootprintForm, Method, Order, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 use sheetsplat::wgpu::{Features, Limits};
 
@@ -29,9 +29,20 @@ fn head() -> (Volume, Scene) {
 
 /// A device with only these features.
 fn open(features: Features) -> GpuHeadless {
-    let requirements = DeviceRequirements { features, limits: Limits::default() };
+    with(DeviceRequirements { features, limits: Limits::default() })
+}
+
+/// A device with too little workgroup memory for tiles.
+fn little() -> GpuHeadless {
+    let limits = Limits { max_compute_workgroup_storage_size: 16383, ..Limits::default() };
+    with(DeviceRequirements { features: TILE_FEATURES, limits })
+}
+
+fn with(requirements: DeviceRequirements) -> GpuHeadless {
     GpuHeadless::new(&on_adapter().with_requirements(requirements)).unwrap()
 }
+
+const EYE: Projection = Projection::Perspective { fov_y: 40.0, distance: None, near: None };
 
 /// The rasterizer that drew a frame.
 fn drawn_by(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> String {
@@ -61,7 +72,8 @@ fn auto_chooses_tiles_where_they_are_supported() {
     let (volume, mut scene) = head();
     assert_eq!(scene.splatting.rasterizer, Rasterizer::Auto, "the default");
     assert_eq!(drawn_by(&subgroups, &volume, &scene), "tiles");
-    assert_eq!(drawn_by(&none, &volume, &scene), "quads");
+    assert_eq!(drawn_by(&none, &volume, &scene), "tiles");
+    assert_eq!(drawn_by(&little(), &volume, &scene), "quads");
     for rasterizer in RASTERIZERS {
         scene.splatting.rasterizer = rasterizer;
         assert_eq!(drawn_by(&subgroups, &volume, &scene), format!("{rasterizer:?}").to_lowercase());
@@ -73,24 +85,111 @@ fn auto_chooses_tiles_where_they_are_supported() {
     assert_eq!(drawn_by(&subgroups, &volume, &scene), "quads");
 }
 
-/// Where a subgroup is a workgroup, barriers of workgroups serve as well.
+/// Where a subgroup is a workgroup, barriers of workgroups serve as well; and without subgroups a workgroup's threads share values in its memory.
 #[test]
-fn tiles_need_no_barriers_of_subgroups() {
-    let [of_subgroups, of_workgroups] = [TILE_FEATURES, Features::SUBGROUP].map(open);
+fn tiles_need_no_subgroups() {
+    // Room for all sums.
+    let limits = Limits { max_compute_workgroup_storage_size: 32768, ..Limits::default() };
+    let [of_subgroups, only_subgroups, of_workgroups] = [TILE_FEATURES, Features::SUBGROUP, Features::empty()]
+        .map(|features| with(DeviceRequirements { features, limits: limits.clone() }));
     let (volume, mut scene) = head();
-    scene.splatting.rasterizer = Rasterizer::Tiles;
     // Thick slabs, so that a group has more voxels than the queue holds, and they wait for room in it.
-    scene.camera =
-        Camera { projection: Projection::Perspective { fov_y: 40.0, distance: None, near: None }, ..scene.camera };
-    scene.splatting.slab_width = 2.0;
-    for classification in [Classification::Before, Classification::After] {
-        scene.splatting.classification = classification;
-        let [expected, actual] =
-            [&of_subgroups, &of_workgroups].map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
-        assert!(expected.image.pixels.iter().any(|pixel| pixel[3] > 0.5), "{classification:?}");
-        assert!(actual.image == expected.image, "{classification:?}");
-        assert_eq!(actual.stats.counts, expected.stats.counts, "{classification:?}");
+    (scene.splatting.rasterizer, scene.splatting.slab_width) = (Rasterizer::Tiles, 2.0);
+    type Change = fn(&mut Scene);
+    let of_lanes: [(&str, Change); 10] = [
+        ("before, from an eye", |scene| scene.camera.projection = EYE),
+        ("after, from an eye", |scene| {
+            (scene.camera.projection, scene.splatting.classification) = (EYE, Classification::After);
+        }),
+        ("parallelogram", |scene| scene.splatting.footprint_box = FootprintBox::Parallelogram),
+        ("back to front", |scene| scene.splatting.order = Order::BackToFront),
+        ("economies", |scene| {
+            scene.splatting.experimental = Economies { whole_below: 0.1, beta: 1.0, resolution: 0.01 };
+        }),
+        ("many control points", |scene| {
+            let opacity: Vec<_> = (0..40).map(|at| (f64::from(at) * 6.0, f64::from(at % 5) * 0.02)).collect();
+            scene.transfer = transfer(&[(0.0, [0.9, 0.8, 0.7])], &opacity);
+        }),
+        ("kernel, exact", |scene| {
+            (scene.splatting.classification, scene.splatting.interpolation) =
+                (Classification::After, Interpolation::Exact);
+            scene.shading.gradient = Gradient::Kernel;
+        }),
+        ("kernel, from an eye", |scene| {
+            (scene.splatting.classification, scene.shading.gradient) = (Classification::After, Gradient::Kernel);
+            scene.camera.projection = EYE;
+        }),
+        ("surface", |scene| {
+            let splatting = &mut scene.splatting;
+            (splatting.classification, splatting.compositing) = (Classification::After, Compositing::Surface);
+            scene.transfer = transfer(&[(0.0, [0.9, 0.6, 0.4])], &[(60.0, 0.0), (100.0, 1.0)]);
+        }),
+        ("average", |scene| {
+            let splatting = &mut scene.splatting;
+            (splatting.classification, splatting.compositing) = (Classification::After, Compositing::Average);
+        }),
+    ];
+    for (what, change) in of_lanes {
+        let mut scene = scene.clone();
+        change(&mut scene);
+        for culling in [true, false] {
+            scene.splatting.culling = culling;
+            let [expected, only, workgroups] = [&of_subgroups, &only_subgroups, &of_workgroups]
+                .map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
+            assert!(only.image == expected.image, "{what}");
+            assert_eq!(only.stats.counts, expected.stats.counts, "{what}");
+            assert_alike(&workgroups, &expected, culling, what);
+        }
     }
+}
+
+/// Asserts that a workgroup's threads have drawn what a subgroup's have. Their queue is shorter, so that sums are rounded elsewhere, other bricks are
+/// visited again, and with culling a voxel may be hidden sooner or later.
+fn assert_alike(workgroups: &Rendering, subgroups: &Rendering, culling: bool, what: &str) {
+    let decibels = psnr(&workgroups.image.pixels, &subgroups.image.pixels, BLACK, 300);
+    println!("{what}: {decibels:.1} dB");
+    assert_at_least(decibels, 140.0, what);
+    let [mut counts, expected] = [workgroups, subgroups].map(|rendering| rendering.stats.counts);
+    counts.bricks_visited = expected.bricks_visited;
+    assert!(culling || counts == expected, "{what}: {counts:?}, not {expected:?}");
+}
+
+/// The same of two channels that share sheets.
+#[test]
+fn channels_need_no_subgroups() {
+    let limits = Limits { max_compute_workgroup_storage_size: 32768, ..Limits::default() };
+    let gpus = [TILE_FEATURES, Features::empty()]
+        .map(|features| with(DeviceRequirements { features, limits: limits.clone() }));
+    let (volume, mut scene) = head();
+    let values = volume.values().iter().map(|value| 255.0 - value).collect();
+    let other = Volume::new("other", volume.grid().dims, volume.spacing(), values).unwrap();
+    let volume = volume.with_channels("both", vec![other]).unwrap();
+    let mut channel = Channel::new(VolumeSource::Memory);
+    channel.transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(100.0, 0.0), (200.0, 0.1)]);
+    (scene.splatting.rasterizer, scene.further) = (Rasterizer::Tiles, vec![channel]);
+    for (classification, culling) in [
+        (Classification::Before, true),
+        (Classification::Before, false),
+        (Classification::After, true),
+        (Classification::After, false),
+    ] {
+        // Narrower subgroups cull other voxels.
+        let is_narrow = gpus[0].device().adapter_info().subgroup_max_size < 8;
+        (scene.splatting.classification, scene.splatting.culling) = (classification, culling && !is_narrow);
+        let [expected, actual] = gpus.each_ref().map(|gpu| gpu.render_volume(volume.clone(), &scene).unwrap());
+        assert_alike(&actual, &expected, culling, &format!("{classification:?}"));
+    }
+}
+
+/// The same where not all threads of a workgroup execute an instruction together, as lavapipe's do where its vectors hold 8: barriers keep them from reading too soon, and
+/// from writing over what others have yet to read.
+#[test]
+fn threads_of_several_vectors_wait_for_one_another() {
+    let mut test = std::process::Command::new(std::env::current_exe().unwrap());
+    let run =
+        test.args(["--exact", "channels_need_no_subgroups"]).env("LP_NATIVE_VECTOR_WIDTH", "128").output().unwrap();
+    let output = String::from_utf8_lossy(&run.stdout);
+    assert!(run.status.success() && output.contains("1 passed"), "{output}{}", String::from_utf8_lossy(&run.stderr));
 }
 
 /// After splatting, sums with the kernel's gradient and those of colours need more workgroup memory than WebGPU's default. Quads draw them there.
@@ -115,7 +214,7 @@ fn quads_draw_what_tiles_do_not_after_splatting() {
 
 #[test]
 fn settings_that_require_tiles_are_refused_without_them() {
-    let [subgroups, none] = [TILE_FEATURES, Features::empty()].map(open);
+    let subgroups = open(TILE_FEATURES);
     let refused = |gpu: &GpuHeadless, (volume, scene): &(Volume, Scene), words: &[&str]| {
         let (key, message) = refusal(gpu, volume, scene);
         assert_eq!(key, "splatting.rasterizer", "{message}");
@@ -127,13 +226,10 @@ fn settings_that_require_tiles_are_refused_without_them() {
         (volume, scene)
     };
     let tiles = with(|scene| scene.splatting.rasterizer = Rasterizer::Tiles);
-    refused(&none, &tiles, &["\"tiles\"", "subgroups", "\"quads\""]);
-    let limits = Limits { max_compute_workgroup_storage_size: 16383, ..Limits::default() };
-    let requirements = DeviceRequirements { features: TILE_FEATURES, limits };
-    let little = GpuHeadless::new(&on_adapter().with_requirements(requirements)).unwrap();
+    let little = little();
     refused(&little, &tiles, &["max_compute_workgroup_storage_size", "16383", "16384", "\"quads\""]);
     let parallelogram = with(|scene| scene.splatting.footprint_box = FootprintBox::Parallelogram);
-    refused(&none, &parallelogram, &["\"tiles\"", "subgroups"]);
+    refused(&little, &parallelogram, &["\"tiles\"", "16383"]);
     assert_eq!(drawn_by(&subgroups, &parallelogram.0, &parallelogram.1), "tiles");
     let sections = with(|scene| {
         (scene.splatting.rasterizer, scene.splatting.footprint) = (Rasterizer::Tiles, FootprintForm::Sections);
@@ -228,13 +324,12 @@ fn a_fallback_to_quads_says_why_once() {
         scene.splatting.footprint = FootprintForm::Sections;
         scene
     };
-    for (features, scene, reason) in [
-        (Features::empty(), scene.clone(), Some("subgroups")),
-        (TILE_FEATURES, scene.clone(), None),
+    for (gpu, scene, reason) in [
+        (little(), scene.clone(), Some("max_compute_workgroup_storage_size")),
+        (open(TILE_FEATURES), scene.clone(), None),
         // The settings require quads.
-        (Features::empty(), sections(scene), None),
+        (little(), sections(scene), None),
     ] {
-        let gpu = open(features);
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
         assert!(view.fallback().is_none());
         for _ in 0..2 {

@@ -1,21 +1,12 @@
 // Bit masks, and values that a subgroup's lanes hold together.
 //
-// Needs gather/patch.wgsl: THREADS, lane, lanes.
+// Needs gather/patch.wgsl: lane.
+// Needs gather/subgroup_lanes.wgsl: together.
+// Needs gather/workgroup_lanes.wgsl: together.
 
 // A mask of the lanes in which a condition holds.
 fn ballot(holds: bool) -> u32 {
     return together(vec2u(select(0u, 1u << lane, holds), 0u)).x;
-}
-
-// The union of all lanes' bits, in fewer steps than a software driver's `subgroupOr`, which asks one lane after the other.
-fn together(bits: vec2u) -> vec2u {
-    if THREADS > 8u {
-        return subgroupOr(bits);
-    }
-    var result = bits;
-    result |= subgroupShuffleXor(result, 1u);
-    result |= subgroupShuffleXor(result, 2u);
-    return select(result, result | subgroupShuffleXor(result, 4u), vec2<bool>(lanes == 8u));
 }
 
 // The first bits of a mask, moved to the bits from a multiple of the number of lanes on.

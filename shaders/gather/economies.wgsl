@@ -3,11 +3,13 @@
 // input unchanged.
 //
 // Needs gather/amounts.wgsl: Shaded, screen_box.
-// Needs gather/kernel.wgsl: footprint_at.
+// Needs gather/kernel.wgsl: RIM_SLOT, footprint_at.
 // Needs gather/patch.wgsl: PERSPECTIVE, SHEETS, gather, open, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
 // Needs gather/region.wgsl: block_word, with_blocks.
+// Needs gather/subgroup_lanes.wgsl: held, hold.
 // Needs gather/voxels.wgsl: blocks_seen.
+// Needs gather/workgroup_lanes.wgsl: held, hold.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps.
 
@@ -91,10 +93,17 @@ fn economic_rim(amount: f32, maps: SectionMaps) -> vec4f {
     return vec4f(0.0);
 }
 
+// Holds this lane's rim for the others.
+fn hold_rim(own: vec4f) {
+    if ECONOMIES {
+        hold(RIM_SLOT, own);
+    }
+}
+
 // Another lane's rim.
 fn rim_of(own: vec4f, other: u32) -> vec4f {
     if ECONOMIES {
-        return subgroupShuffle(own, other);
+        return held(RIM_SLOT, own, other);
     }
     return own;
 }

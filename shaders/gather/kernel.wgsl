@@ -1,7 +1,9 @@
 // Kernels in the tile rasterizer's closed form: polynomials instead of tables (eq. 3).
 //
-// Needs gather/economies.wgsl: KernelPlanes, economic_planes, economic_rim, rim_of, within_rim.
+// Needs gather/economies.wgsl: KernelPlanes, economic_planes, economic_rim, hold_rim, rim_of, within_rim.
 // Needs gather/patch.wgsl: PERSPECTIVE, gather.
+// Needs gather/subgroup_lanes.wgsl: begin_holding, end_holding, held, held_number, held_pair, hold.
+// Needs gather/workgroup_lanes.wgsl: begin_holding, end_holding, held, held_number, held_pair, hold.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/local_ray.wgsl: SectionMaps, local_ray, near_cut, section_maps.
 
@@ -98,18 +100,46 @@ fn rim_at(rho_squared: vec4f) -> vec4f {
     return sqrt(chord_squared) * (low + z_squared * z_squared * high);
 }
 
+// The slots in which lanes hold their footprints.
+const AMOUNT_SLOT = 0u;
+const PLANES_SLOT = 1u;
+const CENTER_SLOT = 2u;
+const FIRST_SLOT = 3u;
+const AXIS_SLOT = 4u;
+const ALONG_SLOT = 5u;
+const ACROSS_SLOT = 6u;
+const AMPLITUDE_SLOT = 7u;
+const RIM_SLOT = 8u;
+
+// Holds this lane's footprint for the others.
+fn hold_footprint(own: Footprint) {
+    begin_holding();
+    hold(AMOUNT_SLOT, own.amount);
+    hold(PLANES_SLOT, own.planes);
+    hold(CENTER_SLOT, vec4f(own.center_px, 0.0, 0.0));
+    hold(FIRST_SLOT, vec4f(own.first_plane));
+    if PERSPECTIVE {
+        hold(AXIS_SLOT, vec4f(own.axis, 0.0, 0.0));
+        hold(ALONG_SLOT, own.maps.along);
+        hold(ACROSS_SLOT, own.maps.across);
+        hold(AMPLITUDE_SLOT, own.maps.amplitude);
+    }
+    hold_rim(own.rim);
+    end_holding();
+}
+
 // Another lane's footprint.
 fn footprint_of(own: Footprint, other: u32) -> Footprint {
     var footprint: Footprint;
-    footprint.center_px = subgroupShuffle(own.center_px, other);
-    footprint.amount = subgroupShuffle(own.amount, other);
-    footprint.first_plane = subgroupShuffle(own.first_plane, other);
-    footprint.planes = subgroupShuffle(own.planes, other);
+    footprint.center_px = held_pair(CENTER_SLOT, own.center_px, other);
+    footprint.amount = held(AMOUNT_SLOT, own.amount, other);
+    footprint.first_plane = held_number(FIRST_SLOT, own.first_plane, other);
+    footprint.planes = held(PLANES_SLOT, own.planes, other);
     if PERSPECTIVE {
-        footprint.axis = subgroupShuffle(own.axis, other);
-        footprint.maps.along = subgroupShuffle(own.maps.along, other);
-        footprint.maps.across = subgroupShuffle(own.maps.across, other);
-        footprint.maps.amplitude = subgroupShuffle(own.maps.amplitude, other);
+        footprint.axis = held_pair(AXIS_SLOT, own.axis, other);
+        footprint.maps.along = held(ALONG_SLOT, own.maps.along, other);
+        footprint.maps.across = held(ACROSS_SLOT, own.maps.across, other);
+        footprint.maps.amplitude = held(AMPLITUDE_SLOT, own.maps.amplitude, other);
     }
     footprint.rim = rim_of(own.rim, other);
     return footprint;

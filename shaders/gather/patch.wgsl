@@ -11,9 +11,13 @@
 // Needs gather/region.wgsl: PATCH_HEIGHT, PATCH_WIDTH, with_blocks.
 // Needs gather/sheets.wgsl: Sheets, find_stretches, save_sheets, saved_sheets.
 // Needs gather/slabs.wgsl: find_handed_on, find_stretches.
+// Needs gather/subgroup_barrier.wgsl: meet.
+// Needs gather/subgroup_lanes.wgsl: sums_of_lanes, united.
 // Needs gather/uniforms.wgsl: Gather, Gathered, PatchRange.
 // Needs gather/voxels.wgsl: GatheredGroup, find_voxels, keep_voxels, may_appear, search_bounds.
 // Needs gather/walk.wgsl: is_walked, walk.
+// Needs gather/workgroup_barrier.wgsl: meet.
+// Needs gather/workgroup_lanes.wgsl: sums_of_lanes, united.
 // Needs gather_planes.wgsl: add_sections, begin_layer, composite_pixels, counts_gaps, draws_all_groups, is_due_without_voxels, layers, looks_along_rays, shade_voxels, shallow_after.
 // Needs shared/brick.wgsl: Brick, Indirect, LAYER_BITS, indirect, layer_bit, unfold.
 // Needs shared/cut.wgsl: Cut, FAR.
@@ -148,7 +152,7 @@ fn draw_queue(corner: vec2u, threads: vec2u, thread: u32, is_last: bool, progres
     for (var round = threads.x; round < threads.y; round += THREADS) {
         passes += PASSES_PER_ROUND;
         let pixels = pixels_of(corner, round + thread);
-        let blocks = subgroupOr(1u << pixels.block);
+        let blocks = united(1u << pixels.block);
         let halves = halves_of(pixels.thread);
         var has_begun = ((*progress).begun & halves) != 0u;
         var sheets = Sheets();
@@ -178,13 +182,13 @@ fn draw_layer(corner: vec2u, threads: vec2u, thread: u32, first: u32, is_kept: b
     loop {
         passes += PASSES_PER_FILL;
         find_voxels(search, is_kept);
-        subgroupBarrier();
+        meet();
         shade_voxels(first_new);
-        subgroupBarrier();
+        meet();
         let is_last = is_walked();
         outcome.has_drawn |= queue_count > 0u;
         draw_queue(corner, threads, thread, is_last, &progress);
-        subgroupBarrier();
+        meet();
         if is_last {
             break;
         }
@@ -209,7 +213,7 @@ fn count_composited(at: u32, pixel: vec2u) {
 
 // Stores the group at which the next dispatch continues, and adds the subgroup's counts to the frame's.
 fn finish(at: u32, reached: u32) {
-    let all_counts = subgroupAdd(drawn);
+    let all_counts = sums_of_lanes(drawn);
     if lane == 0u {
         // Where all pixels are opaque nothing is left to do.
         let is_done = at == gather.groups || all(open == vec4u(0u));
@@ -305,25 +309,17 @@ fn interleaved(at: u32) -> u32 {
     return at / columns * patch_range.row_step % rows * columns + at % columns;
 }
 
-@compute @workgroup_size(THREADS)
-fn main(
-    @builtin(local_invocation_index) thread: u32,
-    @builtin(workgroup_id) workgroup: vec3u,
-    @builtin(subgroup_size) subgroup_size: u32,
-    @builtin(subgroup_invocation_id) subgroup_invocation_id: u32,
-) {
-    // A larger subgroup has the patch's threads and no others.
-    lanes = min(subgroup_size, THREADS);
-    lane = subgroup_invocation_id;
+// Draws what a workgroup has to draw of its patch.
+fn draw_of_workgroup(workgroup: vec3u, thread: u32) {
     start(workgroup.z);
     gather = gathers[zero];
     let at_workgroup = unfold(workgroup);
     let at_patch = at_workgroup / WORKGROUPS_PER_PATCH;
     let number = patch_range.first_patch + interleaved(at_patch);
     let first_thread = at_workgroup % WORKGROUPS_PER_PATCH * (PATCH_THREADS / WORKGROUPS_PER_PATCH);
+    let half = firstTrailingBit(halves_of(first_thread + thread));
     var is_left = false;
     if at_patch < patch_range.end_patch - patch_range.first_patch {
-        let half = firstTrailingBit(halves_of(first_thread + thread));
         let at = atomicLoad(&gathered.words[gather.reached + number * HALVES + half]);
         // Some modes count empty groups too, even behind the last brick of the patch.
         let first = select(at, 0u, draws_all_groups() && at < gather.groups);

@@ -5,6 +5,8 @@
 // Needs gather/region.wgsl: block_word.
 // Needs gather/sheets.wgsl: hits, shown_from, shown_to.
 // Needs gather/slabs.wgsl: hits, shown_from, shown_to.
+// Needs gather/subgroup_lanes.wgsl: united.
+// Needs gather/workgroup_lanes.wgsl: united.
 // Needs gather_planes.wgsl: cuts_rays.
 // Needs shared/frame.wgsl: frame.
 
@@ -24,7 +26,7 @@ struct Pixels {
 
 // A mask of the halves of blocks, four threads each, in which a subgroup has the threads of a round.
 fn halves_of(thread: u32) -> u32 {
-    return subgroupOr(1u << thread / 4u);
+    return united(1u << thread / 4u);
 }
 
 fn pixels_of(corner: vec2u, thread: u32) -> Pixels {

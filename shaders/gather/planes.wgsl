@@ -2,6 +2,8 @@
 //
 // Needs gather/patch.wgsl: PATCH_THREADS, PERSPECTIVE, gather, sheet_group.
 // Needs gather/pixels.wgsl: Pixels.
+// Needs gather/subgroup_lanes.wgsl: begin_holding, end_holding, held, held_pair, hold.
+// Needs gather/workgroup_lanes.wgsl: begin_holding, end_holding, held, held_pair, hold.
 // Needs gather_planes.wgsl: planes.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/planes.wgsl: MIN_WEIGHT.
@@ -141,24 +143,55 @@ fn kernel_at(point: vec4f, amount: vec4f, is_there: bool) -> PlaneKernel {
     return PlaneKernel(vec4f(point.x + middle.x), vec4f(point.y + middle.y), amount, distances, weights, cuts, vec4f());
 }
 
+// The slots in which lanes hold their kernels.
+const AMOUNT_SLOT = 0u;
+const WEIGHTS_SLOT = 1u;
+const CENTER_SLOT = 2u;
+const CUTS_SLOT = 3u;
+const CENTER_Y_SLOT = 4u;
+const DISTANCES_SLOT = 5u;
+const COLOR_SLOT = 6u;
+
+// Holds this lane's kernel for the others.
+fn hold_kernel(own: PlaneKernel) {
+    begin_holding();
+    hold(AMOUNT_SLOT, own.amount);
+    hold(WEIGHTS_SLOT, own.weights);
+    hold(CUTS_SLOT, own.cuts);
+    if PERSPECTIVE {
+        hold(CENTER_SLOT, own.center_x);
+        hold(CENTER_Y_SLOT, own.center_y);
+    } else {
+        hold(CENTER_SLOT, vec4f(own.center_x.x, own.center_y.x, 0.0, 0.0));
+    }
+    if KERNEL_GRADIENT {
+        hold(DISTANCES_SLOT, own.distances);
+    }
+    if OWN_COLORS {
+        hold(COLOR_SLOT, own.color);
+    }
+    end_holding();
+}
+
 // The kernel of another lane.
 fn kernel_of(own: PlaneKernel, other: u32) -> PlaneKernel {
     var kernel: PlaneKernel;
-    kernel.amount = subgroupShuffle(own.amount, other);
-    kernel.weights = subgroupShuffle(own.weights, other);
-    kernel.cuts = subgroupShuffle(own.cuts, other);
+    kernel.amount = held(AMOUNT_SLOT, own.amount, other);
+    kernel.weights = held(WEIGHTS_SLOT, own.weights, other);
+    kernel.cuts = held(CUTS_SLOT, own.cuts, other);
     if PERSPECTIVE {
-        kernel.center_x = subgroupShuffle(own.center_x, other);
-        kernel.center_y = subgroupShuffle(own.center_y, other);
+        kernel.center_x = held(CENTER_SLOT, own.center_x, other);
+        kernel.center_y = held(CENTER_Y_SLOT, own.center_y, other);
     } else {
-        kernel.center_x = vec4f(subgroupShuffle(own.center_x.x, other));
-        kernel.center_y = vec4f(subgroupShuffle(own.center_y.x, other));
+        let center = held_pair(CENTER_SLOT, vec2f(own.center_x.x, own.center_y.x), other);
+        kernel.center_x = vec4f(center.x);
+        kernel.center_y = vec4f(center.y);
     }
     if KERNEL_GRADIENT {
-        kernel.distances = subgroupShuffle(own.distances, other);
+        kernel.distances = held(DISTANCES_SLOT, own.distances, other);
     }
     if OWN_COLORS {
-        kernel.color = subgroupShuffle(own.color, other);
+        kernel.color = held(COLOR_SLOT, own.color, other);
     }
     return kernel;
 }

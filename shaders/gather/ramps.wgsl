@@ -1,6 +1,8 @@
 // Ramps whose first control points are distributed among the lanes of a subgroup.
 //
 // Needs gather/patch.wgsl: THREADS, control_points, lane, lanes.
+// Needs gather/subgroup_lanes.wgsl: control_point, control_value.
+// Needs gather/workgroup_lanes.wgsl: control_point, control_value.
 // Needs shared/shading.wgsl: between.
 
 // A ramp: the range of its control points, and this lane's share of the first of them.
@@ -27,8 +29,8 @@ fn ramp_at(held: Ramp, value: f32) -> vec3f {
     below += select(0u, 2u, is_below(held, below + 1u, value));
     below += select(0u, 1u, is_below(held, below, value));
     below += select(0u, 1u, is_below(held, below, value));
-    let a = subgroupShuffle(held.own, max(below, 1u) - 1u);
-    let b = subgroupShuffle(held.own, min(below, min(count, lanes) - 1u));
+    let a = control_point(held, max(below, 1u) - 1u);
+    let b = control_point(held, min(below, min(count, lanes) - 1u));
     return between(a, b, value);
 }
 
@@ -40,7 +42,7 @@ fn is_long(held: Ramp) -> bool {
 // Whether one of the first control points is at or below a value. All lanes read another's point, also those that search behind the last one: a GPU gives
 // nothing defined from lanes that do not take part.
 fn is_below(held: Ramp, at: u32, value: f32) -> bool {
-    let point = subgroupShuffle(held.own.x, at % lanes);
+    let point = control_value(held, at % lanes);
     return at < min(held.end - held.first, lanes) && point <= value;
 }
 

@@ -2,6 +2,8 @@
 // row.
 //
 // Needs gather/patch.wgsl: gather, lanes.
+// Needs gather/subgroup_lanes.wgsl: of_lane, of_opposite.
+// Needs gather/workgroup_lanes.wgsl: of_lane, of_opposite.
 
 // The width of a patch in pixels.
 const PATCH_WIDTH = 16u;
@@ -14,10 +16,10 @@ fn block_word(thread: u32, is_in: vec4<bool>) -> u32 {
     let rows = vec4u(1u, 1u << 8u, 1u << 16u, 1u << 24u) << vec4u(thread % 8u);
     let bits = select(vec4u(0u), rows, is_in);
     var word = bits.x | bits.y | bits.z | bits.w;
-    word |= subgroupShuffleXor(word, 1u);
-    word |= subgroupShuffleXor(word, 2u);
+    word |= of_opposite(word, 1u);
+    word |= of_opposite(word, 2u);
     // A subgroup of four threads has half a block.
-    return select(word, word | subgroupShuffleXor(word, 4u), lanes >= 8u);
+    return select(word, word | of_opposite(word, 4u), lanes >= 8u);
 }
 
 // The words with the pixels of a thread's subgroup replaced: of its block, or of half of that, and of the other blocks in its subgroup.
@@ -26,8 +28,8 @@ fn with_blocks(words: vec4u, thread: u32, word: u32) -> vec4u {
     // The columns of each row that a subgroup has in a block.
     let own = select(0xffffffffu, 0x0f0f0f0fu << (thread & 4u), lanes < 8u);
     for (var i = 0u; i < lanes; i += 8u) {
-        let is_here = vec4u(0u, 1u, 2u, 3u) == vec4u(subgroupShuffle(thread, i) / 8u);
-        result = select(result, (words & vec4u(~own)) | vec4u(subgroupShuffle(word, i)), is_here);
+        let is_here = vec4u(0u, 1u, 2u, 3u) == vec4u(of_lane(thread, i) / 8u);
+        result = select(result, (words & vec4u(~own)) | vec4u(of_lane(word, i)), is_here);
     }
     return result;
 }

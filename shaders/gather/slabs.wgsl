@@ -3,6 +3,8 @@
 // Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PATCH_THREADS, PERSPECTIVE, SHEETS, THREADS, acc, cut, gather, passes, sheet_group.
 // Needs gather/pixels.wgsl: Pixels, halves_of.
 // Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, colors_of, fields_of, saved.
+// Needs gather/subgroup_lanes.wgsl: largest, united.
+// Needs gather/workgroup_lanes.wgsl: largest, united.
 // Needs gather_planes.wgsl: carried, is_last_layer.
 // Needs shared/cells.wgsl: nearest_voxel, voxel_at.
 // Needs shared/channels.wgsl: CHANNELS.
@@ -89,7 +91,7 @@ fn find_handed_on(pixels: Pixels) {
 
 // Notes whether a thread's pixels have values on the plane that is handed on.
 fn note_handed_on(pixels: Pixels, is_any: bool) {
-    halves_handed_on |= subgroupOr(select(0u, 1u << pixels.thread / 4u, is_any));
+    halves_handed_on |= united(select(0u, 1u << pixels.thread / 4u, is_any));
 }
 
 // Removes a plane's values where the nearest voxel is a hole.
@@ -255,7 +257,7 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
             left &= ~select(0u, (0x1111u << i) & (0xffffu << tested), !is_open(now.image));
         }
     }
-    passes += subgroupMax(count) * gather.search_passes;
+    passes += largest(count) * gather.search_passes;
 
     for (var i = 0u; i < 4u; i += 1u) {
         let last = 4u * (SHEETS - 1u) + i;

@@ -7,7 +7,9 @@
 // Needs gather/patch.wgsl: ORDER, PARALLELOGRAM, PASSES_PER_FIND, PERSPECTIVE, SHEETS, drawn, first_px, gather, gathered, lane, lanes, open, passes, sheet_group.
 // Needs gather/queue.wgsl: QUEUE_COLORS, enqueue, queue_amounts, queue_blocks, queue_colors, queue_count, queue_first, queue_points, queue_size.
 // Needs gather/region.wgsl: blocks_in_box, blocks_in_parallelogram, bounds_of.
+// Needs gather/subgroup_barrier.wgsl: meet.
 // Needs gather/walk.wgsl: Found, SearchBounds, next_voxels.
+// Needs gather/workgroup_barrier.wgsl: meet.
 // Needs gather_planes.wgsl: ECONOMIES, FIRST_PLANE, current_layer, layers, overlapped_sheets, placed, screen_box, sections_here.
 // Needs shared/brick.wgsl: LAYER_BITS.
 // Needs shared/frame.wgsl: BOX_SLACK, FRONT_TO_BACK, frame.
@@ -94,7 +96,7 @@ fn keep_voxels() {
         let p = vec4f(bitcast<vec3f>(point.xyz), 1.0);
         let sheets = overlapped_sheets(p);
         let is_in = i + lane < count && is_drawn_here(p, sheets);
-        subgroupBarrier();
+        meet();
         let kept_slot = enqueue(is_in, point.w, p, blocks_here(p) | layers_in);
         if is_in {
             queue_amounts[kept_slot] = amount;

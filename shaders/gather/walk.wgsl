@@ -3,10 +3,12 @@
 //
 // Needs gather.wgsl: layers.
 // Needs gather/amounts.wgsl: is_searched_in_perspective.
-// Needs gather/bits.wgsl: ballot, nth_set_bit, together.
+// Needs gather/bits.wgsl: ballot, nth_set_bit.
 // Needs gather/patch.wgsl: PERSPECTIVE, bins, bricks, bricks_visited, lane, lanes, passes.
+// Needs gather/subgroup_lanes.wgsl: together.
+// Needs gather/workgroup_lanes.wgsl: together.
 // Needs gather_planes.wgsl: is_searched_in_perspective, layers.
-// Needs shared/brick.wgsl: BRICK_VOXELS, in_brick, layers_of.
+// Needs shared/brick.wgsl: BRICK_VOXELS, Brick, in_brick, layers_of.
 // Needs shared/frame.wgsl: frame.
 // Needs shared/project.wgsl: homogeneous.
 
@@ -25,17 +27,13 @@ fn is_searched_for(search: SearchBounds, p: vec4f) -> bool {
 
 // The state of the walk.
 struct Walk {
-    // The entries that have not been fetched yet.
+    // The entries that have not been tested yet.
     next: u32,
     end: u32,
     // A mask of the layers whose bricks are visited.
     wanted: u32,
-    // Bricks are fetched one per lane: the brick's index, corner and voxels, and a mask of the lanes whose bricks must be visited.
+    // Bricks are tested one per lane: a mask of the lanes whose bricks must be visited.
     to_visit: u32,
-    fetched: u32,
-    fetched_corner: vec3u,
-    fetched_present: vec2u,
-    fetched_layers: u32,
     // The visited brick, a mask of its layers, its voxels that match the search, and the number of those that have been found.
     brick: u32,
     in_layers: u32,
@@ -60,18 +58,19 @@ fn is_walked() -> bool {
     return walk_state.next >= walk_state.end && walk_state.to_visit == 0u && walk_state.found_count == walk_state.matching_count;
 }
 
-// Fetches one brick per lane.
-fn fetch_bricks(search: SearchBounds) {
+// The first voxel of a brick.
+fn corner_of(record: Brick) -> vec3u {
+    return vec3u(record.x, record.y, record.z) & vec3u(~3u);
+}
+
+// Tests one brick per lane.
+fn test_bricks(search: SearchBounds) {
     passes += 1u;
-    walk_state.fetched = bins[min(walk_state.next + lane, walk_state.end - 1u)];
-    let record = bricks[walk_state.fetched];
-    walk_state.fetched_corner = vec3u(record.x, record.y, record.z) & vec3u(~3u);
-    walk_state.fetched_present = record.present;
-    walk_state.fetched_layers = layers_of(record);
+    let record = bricks[bins[min(walk_state.next + lane, walk_state.end - 1u)]];
     var may_hold = walk_state.next + lane < walk_state.end;
-    may_hold &= layers() == 1u || (walk_state.fetched_layers & walk_state.wanted) != 0u;
+    may_hold &= layers() == 1u || (layers_of(record) & walk_state.wanted) != 0u;
     if !PERSPECTIVE {
-        let middle = homogeneous(vec4f(vec3f(walk_state.fetched_corner) + 1.5, 1.0)).xyz;
+        let middle = homogeneous(vec4f(vec3f(corner_of(record)) + 1.5, 1.0)).xyz;
         let rows = frame.screen_from_voxel;
         // A little more than half the brick, because its voxels are tested more exactly.
         let half = 1.501 * vec3f(dot(abs(rows[0].xyz), vec3f(1.0)), dot(abs(rows[1].xyz), vec3f(1.0)), dot(abs(rows[2].xyz), vec3f(1.0)));
@@ -81,16 +80,14 @@ fn fetch_bricks(search: SearchBounds) {
     walk_state.next += lanes;
 }
 
-// Goes to the next fetched brick.
+// Goes to the next brick that must be visited.
 fn visit_brick(search: SearchBounds) {
     let next = firstTrailingBit(walk_state.to_visit);
     walk_state.to_visit &= walk_state.to_visit - 1u;
-    walk_state.brick = subgroupShuffle(walk_state.fetched, next);
-    walk_state.corner = subgroupShuffle(walk_state.fetched_corner, next);
-    let present = subgroupShuffle(walk_state.fetched_present, next);
-    if layers() > 1u {
-        walk_state.in_layers = subgroupShuffle(walk_state.fetched_layers, next);
-    }
+    walk_state.brick = bins[walk_state.next - lanes + next];
+    let record = bricks[walk_state.brick];
+    walk_state.corner = corner_of(record);
+    walk_state.in_layers = layers_of(record);
     bricks_visited += 1u;
 
     // Every lane tests a run of the brick's slots, two at a time.
@@ -107,7 +104,7 @@ fn visit_brick(search: SearchBounds) {
     passes += run / 2u + 3u;
     let shift = lane * run;
     let shifted = reaching << (shift % 32u);
-    walk_state.matching_voxels = present & together(select(vec2u(0u, shifted), vec2u(shifted, 0u), shift < 32u));
+    walk_state.matching_voxels = record.present & together(select(vec2u(0u, shifted), vec2u(shifted, 0u), shift < 32u));
     let ones = countOneBits(walk_state.matching_voxels);
     walk_state.matching_count = ones.x + ones.y;
     walk_state.found_count = 0u;
@@ -128,7 +125,7 @@ fn next_voxels(search: SearchBounds, found: ptr<function, Found>) -> u32 {
     while count < lanes {
         while walk_state.found_count == walk_state.matching_count && (walk_state.to_visit != 0u || walk_state.next < walk_state.end) {
             while walk_state.to_visit == 0u && walk_state.next < walk_state.end {
-                fetch_bricks(search);
+                test_bricks(search);
             }
             if walk_state.to_visit == 0u {
                 break;

@@ -9,7 +9,7 @@ pub use crate::error::device::{DeviceError, InsufficientLimit};
 /// Features that the renderer uses if the device has them. It requires none of them.
 pub const WANTED_FEATURES: Features = Features::FLOAT32_BLENDABLE.union(Features::TIMESTAMP_QUERY).union(TILE_FEATURES);
 
-/// Features that the tile rasterizer uses. It requires subgroups, and barriers for them where a workgroup may have several.
+/// Features that the tile rasterizer uses. It requires none of them.
 pub const TILE_FEATURES: Features = Features::SUBGROUP.union(Features::SUBGROUP_BARRIER);
 
 /// Features and limits of a device.

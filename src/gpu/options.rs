@@ -59,7 +59,7 @@ impl RendererOptions {
 
     /// Options under which the image does not depend on the device's limits and features: on one adapter and driver a scene gives the same bytes
     /// on every device that has at least WebGPU's default limits. Sheets are `Rgba16Float`, 4 per quad, and drawn by quads. Scenes that
-    /// require tiles are drawn by tiles, or refused on a device without subgroups. The target format is `Rgba32Float`; a host may
+    /// require tiles are drawn by tiles, or refused on a device that has none. The target format is `Rgba32Float`; a host may
     /// change it and the fields after it.
     pub const DETERMINISTIC: Self = Self {
         sheet_format: Some(TextureFormat::Rgba16Float),

@@ -7,8 +7,6 @@ pub struct Shader {
     pub stage: &'static str,
     /// The parts of the source in order: each file's path below `shaders/`, and its text.
     pub files: &'static [(&'static str, &'static str)],
-    /// Whether barriers of subgroups are barriers of workgroups instead, each of which must be one subgroup.
-    pub has_workgroup_barriers: bool,
 }
 
 macro_rules! shader {
@@ -19,8 +17,18 @@ macro_rules! shader {
                 $((concat!($file, ".wgsl"), text!($file)),)*
                 (concat!($stage, ".wgsl"), text!($stage)),
             ],
-            has_workgroup_barriers: false,
         }
+    };
+}
+
+/// The stage's variants for every kind of [`Lanes`].
+macro_rules! of_lanes {
+    ($stage:literal $(, $file:literal)*) => {
+        [
+            shader!($stage $(, $file)*, "gather/subgroup_lanes", "gather/subgroup_barrier"),
+            shader!($stage $(, $file)*, "gather/subgroup_lanes", "gather/workgroup_barrier"),
+            shader!($stage $(, $file)*, "gather/workgroup_lanes", "gather/workgroup_barrier"),
+        ]
     };
 }
 
@@ -230,8 +238,8 @@ pub const CLASSIFY: Shader = shader!(
 );
 /// Computes the occlusion buffer.
 pub const OCCLUDE: Shader = shader!("occlude", "shared/frame", "shared/brick", "shared/tile_list");
-/// Draws whole tiles from front to back.
-pub const GATHER: Shader = shader!(
+/// Draws whole tiles from front to back, for every kind of [`Lanes`].
+pub const GATHER: [Shader; 3] = of_lanes!(
     "gather",
     "shared/frame",
     "shared/brick",
@@ -263,7 +271,7 @@ pub const GATHER: Shader = shader!(
     "gather/sheets"
 );
 /// The same with classification after splatting.
-pub const GATHER_PLANES: Shader = shader!(
+pub const GATHER_PLANES: [Shader; 3] = of_lanes!(
     "gather_planes",
     "shared/frame",
     "shared/brick",
@@ -308,6 +316,17 @@ pub const FIRST_HIT: Shader = shader!("first_hit", "shared/frame", "shared/cut")
 /// Composites the result over the background.
 pub const RESOLVE: Shader = shader!("resolve", "shared/frame", "shared/band", "shared/finished");
 
+/// The threads that draw a patch of the tile rasterizer together. The numbers are those of the variants of [`GATHER`] and [`GATHER_PLANES`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lanes {
+    /// A subgroup, whose threads read one another's registers.
+    Subgroup,
+    /// A subgroup that is all of a workgroup, and meets at barriers of workgroups.
+    OnlySubgroup,
+    /// A workgroup, whose threads read one another's values from its memory.
+    Workgroup,
+}
+
 /// Every shader, in the order of the data flow. A page has none of tiles, for which browsers lack what they need.
 pub const ALL: &[Shader] = &[
     CULL_BRICKS,
@@ -326,9 +345,17 @@ pub const ALL: &[Shader] = &[
     CLASSIFY,
     OCCLUDE,
     #[cfg(not(target_arch = "wasm32"))]
-    GATHER,
+    GATHER[0],
     #[cfg(not(target_arch = "wasm32"))]
-    GATHER_PLANES,
+    GATHER[1],
+    #[cfg(not(target_arch = "wasm32"))]
+    GATHER[2],
+    #[cfg(not(target_arch = "wasm32"))]
+    GATHER_PLANES[0],
+    #[cfg(not(target_arch = "wasm32"))]
+    GATHER_PLANES[1],
+    #[cfg(not(target_arch = "wasm32"))]
+    GATHER_PLANES[2],
     JOIN,
     FIRST_HIT,
     RESOLVE,
@@ -342,8 +369,7 @@ impl Shader {
 
     /// The complete WGSL.
     pub fn source(&self) -> String {
-        let source: String = self.files.iter().map(|&(_, text)| text).collect();
-        if self.has_workgroup_barriers { source.replace("subgroupBarrier", "workgroupBarrier") } else { source }
+        self.files.iter().map(|&(_, text)| text).collect()
     }
 
     /// Compiles the shader.

@@ -1,6 +1,7 @@
 //! Draws patches front to back: the single stage of the tile rasterizer, which culls, splats and composites (§6).
 
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use wgpu::{
@@ -13,7 +14,7 @@ use crate::gpu::bindings::{
     ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture_of_integers, uniform,
 };
 use crate::gpu::layout::{Brick, Cut, FieldPlanes, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange};
-use crate::gpu::shaders::{self, Shader};
+use crate::gpu::shaders::{self, Lanes};
 use crate::gpu::volume_texture::{OwnColors, VolumeTexture};
 use crate::lists::patch_bins::{PATCH, SHEETS};
 use crate::settings::shading::Gradient;
@@ -263,7 +264,8 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
     ];
     let flag = |is_set| f64::from(u8::from(is_set));
-    let shader = match mode.planes {
+    let lanes = lanes(device);
+    let variants = match mode.planes {
         Some(planes) => {
             constants.extend([
                 ("KERNEL_GRADIENT", flag(planes.gradient == Gradient::Kernel)),
@@ -282,8 +284,10 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
             shaders::GATHER
         }
     };
-    let shader = Shader { has_workgroup_barriers: uses_workgroup_barriers(device), ..shader };
-    ComputeStage::new(device, shader, "main", &slots, &constants)
+    if lanes == Lanes::Workgroup {
+        constants.push(("HELD", f64::from(held_slots(mode.planes) * threads(device))));
+    }
+    ComputeStage::new(device, variants[lanes as usize], "main", &slots, &constants)
 }
 
 /// Bytes of memory for a workgroup that the stage asks for.
@@ -299,20 +303,40 @@ const PATCH_THREADS: u32 = PATCH[0] * PATCH[1] / 4;
 
 /// The number of threads in a workgroup: those of the largest subgroup, but at most those that hold a patch.
 fn threads(device: &Device) -> u32 {
-    device.adapter_info().subgroup_max_size.min(PATCH_THREADS)
+    let least = if lanes(device) == Lanes::Workgroup { LEAST_LANES } else { 1 };
+    device.adapter_info().subgroup_max_size.clamp(least, PATCH_THREADS)
 }
 
-/// Whether a workgroup is always one subgroup, on a device with subgroups of these least and most threads.
-pub fn is_one_subgroup([least, most]: [u32; 2]) -> bool {
-    least >= most.min(PATCH_THREADS)
+/// The least number of threads that draw a patch together on a device.
+pub fn least_lanes(device: &Device) -> u32 {
+    let smallest = device.adapter_info().subgroup_min_size;
+    if lanes(device) == Lanes::Workgroup { threads(device) } else { smallest }
 }
 
-/// Whether the threads of a subgroup meet at barriers of workgroups. Some devices have no others, and GPUs need only make what a thread has written to workgroup memory
-/// visible to the others at these. A software driver, which keeps the order of reads and writes, takes 1.1 to 1.2 times as long with them.
-fn uses_workgroup_barriers(device: &Device) -> bool {
+/// The least threads of a workgroup that is not divided into subgroups.
+const LEAST_LANES: u32 = 8;
+
+/// The sizes of subgroups that draw patches.
+const SUBGROUP_SIZES: RangeInclusive<u32> = 4..=64;
+
+/// The threads that draw a patch together on a device.
+pub fn lanes(device: &Device) -> Lanes {
     let info = device.adapter_info();
-    let may_choose = info.device_type == DeviceType::Cpu && device.features().contains(Features::SUBGROUP_BARRIER);
-    is_one_subgroup([info.subgroup_min_size, info.subgroup_max_size]) && !may_choose
+    let sizes = [info.subgroup_min_size, info.subgroup_max_size];
+    lanes_of(device.features(), sizes, info.device_type == DeviceType::Cpu)
+}
+
+/// The same for a device with some features, and subgroups of these least and most threads. Where a subgroup is a workgroup, barriers of workgroups serve as well. Some devices
+/// have no others, and GPUs need only make what a thread has written to workgroup memory visible to the others at these. A software driver, which keeps
+/// the order of reads and writes, takes 1.1 to 1.2 times as long with them.
+fn lanes_of(features: Features, sizes: [u32; 2], is_software: bool) -> Lanes {
+    let has_subgroups = features.contains(Features::SUBGROUP) && sizes.iter().all(|size| SUBGROUP_SIZES.contains(size));
+    let is_only = sizes[0] >= sizes[1].min(PATCH_THREADS);
+    match features.contains(Features::SUBGROUP_BARRIER) {
+        true if has_subgroups && (is_software || !is_only) => Lanes::Subgroup,
+        _ if has_subgroups && is_only => Lanes::OnlySubgroup,
+        _ => Lanes::Workgroup,
+    }
 }
 
 impl PlaneMode {
@@ -345,9 +369,25 @@ fn voxel_bytes(planes: Option<PlaneMode>) -> u32 {
 /// The bytes of a list of colours that a mode does not need.
 const NO_COLORS_BYTES: u32 = 16;
 
-/// The minimum workgroup memory in bytes: that of the pixels, and of a queue of two voxels for each thread of the largest subgroup.
-pub fn min_workgroup_bytes(planes: Option<PlaneMode>) -> u32 {
-    NO_COLORS_BYTES + pixel_bytes(planes) + 64 * voxel_bytes(planes)
+/// The slots in which a lane of a workgroup holds numbers for the others: the most that a footprint or kernel has.
+fn held_slots(planes: Option<PlaneMode>) -> u32 {
+    match planes {
+        None => 9,
+        Some(PlaneMode { own_colors: true, .. }) => 7,
+        Some(PlaneMode { gradient: Gradient::Kernel, .. }) => 6,
+        Some(_) => 5,
+    }
+}
+
+/// The workgroup memory in bytes in which lanes share values: those that they hold, and two numbers that they tell one another, twice.
+fn shared_bytes(planes: Option<PlaneMode>, lanes: Lanes) -> u32 {
+    let of_lane = held_slots(planes) * size_of::<[f32; 4]>() as u32 + 2 * size_of::<[u32; 2]>() as u32;
+    if lanes == Lanes::Workgroup { PATCH_THREADS * of_lane } else { 0 }
+}
+
+/// The minimum workgroup memory in bytes: that of the pixels, of a queue of two voxels for each thread of the largest subgroup, and of what lanes share.
+pub fn min_workgroup_bytes(planes: Option<PlaneMode>, lanes: Lanes) -> u32 {
+    NO_COLORS_BYTES + pixel_bytes(planes) + shared_bytes(planes, lanes) + 64 * voxel_bytes(planes)
 }
 
 /// The maximum workgroup memory in bytes. On GPUs it is [`WORKGROUP_BYTES`]: an NVIDIA H100 (driver 580.159.04) draws nothing in some of the modes that need more, and no
@@ -362,8 +402,12 @@ fn most_bytes_of(device_type: DeviceType, limit: u32) -> u32 {
 
 /// The number of voxels in a workgroup's queue, which has the memory that the patch's pixels leave.
 fn queue(device: &Device, mode: GatherMode) -> u32 {
-    let bytes = most_workgroup_bytes(device).min(2 * WORKGROUP_BYTES).max(min_workgroup_bytes(mode.planes));
-    (bytes - NO_COLORS_BYTES - pixel_bytes(mode.planes)) / voxel_bytes(mode.planes) / 32 * 32
+    let lanes = lanes(device);
+    let bytes = most_workgroup_bytes(device).min(2 * WORKGROUP_BYTES).max(min_workgroup_bytes(mode.planes, lanes));
+    (bytes - NO_COLORS_BYTES - pixel_bytes(mode.planes) - shared_bytes(mode.planes, lanes))
+        / voxel_bytes(mode.planes)
+        / 32
+        * 32
 }
 
 /// The size in bytes of the arguments that a dispatch leaves for the next.
@@ -404,15 +448,48 @@ mod tests {
 
     #[test]
     fn gpus_draw_sums_of_at_most_16_kib() {
-        let sums = |gradient, own_colors| {
-            min_workgroup_bytes(Some(PlaneMode { gradient, exact: true, layers: 16, own_colors }))
-        };
+        let sums = |gradient, layers, own_colors| Some(PlaneMode { gradient, exact: true, layers, own_colors });
         for kind in [DeviceType::DiscreteGpu, DeviceType::IntegratedGpu, DeviceType::VirtualGpu, DeviceType::Other] {
             let most = most_bytes_of(kind, 49152);
-            assert!(min_workgroup_bytes(None) <= most && sums(Gradient::Differences, false) <= most, "{kind:?}");
-            assert!(sums(Gradient::Kernel, false) > most && sums(Gradient::Differences, true) > most, "{kind:?}");
+            for (mode, lanes, is_little) in [
+                (None, Lanes::Subgroup, true),
+                (None, Lanes::Workgroup, true),
+                (sums(Gradient::Differences, 16, false), Lanes::OnlySubgroup, true),
+                (sums(Gradient::Differences, 1, false), Lanes::Workgroup, true),
+                (sums(Gradient::Differences, 2, false), Lanes::Workgroup, false),
+                (sums(Gradient::Kernel, 1, false), Lanes::Subgroup, false),
+                (sums(Gradient::Differences, 1, true), Lanes::OnlySubgroup, false),
+            ] {
+                assert_eq!(min_workgroup_bytes(mode, lanes) <= most, is_little, "{kind:?}, {mode:?}, {lanes:?}");
+            }
             assert_eq!(most_bytes_of(kind, 8192), 8192, "{kind:?}");
         }
         assert_eq!(most_bytes_of(DeviceType::Cpu, 32768), 32768);
+    }
+
+    /// Devices as they are: Vulkan on NVIDIA, AMD and Intel, DirectX 12 on these, where subgroups have no barriers, lavapipe, and devices without
+    /// subgroups or with others.
+    #[test]
+    fn every_device_has_lanes() {
+        let with_barriers = Features::SUBGROUP | Features::SUBGROUP_BARRIER;
+        let none = Features::empty();
+        for (features, sizes, is_software, expected) in [
+            (with_barriers, [32, 32], false, Lanes::OnlySubgroup),
+            (with_barriers, [32, 64], false, Lanes::OnlySubgroup),
+            (with_barriers, [64, 64], false, Lanes::OnlySubgroup),
+            (with_barriers, [8, 32], false, Lanes::Subgroup),
+            (with_barriers, [4, 64], false, Lanes::Subgroup),
+            (with_barriers, [8, 8], true, Lanes::Subgroup),
+            (with_barriers, [2, 32], false, Lanes::Workgroup),
+            (with_barriers, [32, 128], false, Lanes::Workgroup),
+            (Features::SUBGROUP, [8, 8], true, Lanes::OnlySubgroup),
+            (Features::SUBGROUP, [32, 64], false, Lanes::OnlySubgroup),
+            (Features::SUBGROUP, [8, 32], false, Lanes::Workgroup),
+            (Features::SUBGROUP_BARRIER, [32, 32], false, Lanes::Workgroup),
+            (none, [32, 32], false, Lanes::Workgroup),
+            (none, [4, 128], false, Lanes::Workgroup),
+        ] {
+            assert_eq!(lanes_of(features, sizes, is_software), expected, "{features:?}, {sizes:?}, {is_software}");
+        }
     }
 }

@@ -1,15 +1,12 @@
 //! The choice of the rasterizer for a view, and what each one refuses.
 
-use wgpu::{Device, Features};
+use wgpu::{Backend, Device, Features};
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::pass::composite::RayMode;
-use crate::pass::gather::{MOST_LAYERS, WORKGROUP_BYTES, is_one_subgroup};
+use crate::pass::gather::{MOST_LAYERS, WORKGROUP_BYTES};
 use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
-
-/// The subgroup sizes that tiles support.
-const SUBGROUP_SIZES: std::ops::RangeInclusive<u32> = 4..=64;
 
 /// Whether tiles are compiled in: browsers have no barriers for subgroups, and a page's code must be short.
 pub(crate) const HAS_TILES: bool = cfg!(not(target_arch = "wasm32"));
@@ -87,25 +84,17 @@ fn obstacle_in_settings(splatting: &Splatting, channels: usize) -> Option<Render
 
 /// Why a device does not support tiles; `None` if it does.
 fn obstacle_in_device(device: &Device) -> Option<RenderError> {
-    let info = device.adapter_info();
     let bytes = device.limits().max_compute_workgroup_storage_size;
-    obstacle_in(device.features(), [info.subgroup_min_size, info.subgroup_max_size], bytes)
+    obstacle_in(device.adapter_info().backend, device.features(), bytes)
 }
 
-/// The same, given the device's features, its least and most threads in a subgroup, and its bytes of workgroup memory.
-fn obstacle_in(features: Features, sizes: [u32; 2], bytes: u32) -> Option<RenderError> {
-    if !HAS_TILES || !features.contains(Features::SUBGROUP) {
-        return refused_tiles("a device without subgroups".to_owned(), "\"quads\"");
-    }
-    let found = format!("subgroups of {} to {} threads", sizes[0], sizes[1]);
-    if sizes.iter().any(|size| !SUBGROUP_SIZES.contains(size)) {
-        return refused_tiles(found, "subgroups of 4 to 64 threads, or \"quads\"");
-    }
-    if !is_one_subgroup(sizes) && !features.contains(Features::SUBGROUP_BARRIER) {
-        return refused_tiles(
-            format!("{found} without barriers"),
-            "barriers for them, subgroups of one size, or \"quads\"",
-        );
+/// The same, given the device's API, its features, and its bytes of workgroup memory.
+fn obstacle_in(backend: Backend, features: Features, bytes: u32) -> Option<RenderError> {
+    // Without subgroups tiles need barriers in loops that only all threads together leave, which two compilers must be able to prove, and cannot: browsers', and DirectX 12's old
+    // one (FXC), the only one that gives no subgroups.
+    let needs_proof = matches!(backend, Backend::Dx12 | Backend::BrowserWebGpu);
+    if !HAS_TILES || needs_proof && !features.contains(Features::SUBGROUP) {
+        return refused_tiles(format!("{backend:?} without subgroups"), "\"quads\"");
     }
     if bytes < WORKGROUP_BYTES {
         return refused_tiles(format!("max_compute_workgroup_storage_size of {bytes}"), "at least 16384, or \"quads\"");
@@ -132,35 +121,23 @@ pub(crate) fn check_hits(device: &Device, rays: RayMode, [width, height]: [u32; 
 mod tests {
     use super::*;
 
-    /// Devices as they are: Vulkan on NVIDIA, AMD and Intel, DirectX 12 on these, where subgroups have no barriers, and one without subgroups.
     #[test]
-    fn subgroups_without_barriers_draw_tiles_where_each_is_a_workgroup() {
-        let with_barriers = Features::SUBGROUP | Features::SUBGROUP_BARRIER;
-        for sizes in [[4, 4], [8, 8], [32, 32], [32, 64], [64, 64], [8, 32], [4, 64]] {
-            assert!(obstacle_in(with_barriers, sizes, 16384).is_none(), "{sizes:?}");
-        }
-        for sizes in [[4, 4], [8, 8], [32, 32], [32, 64], [64, 64]] {
-            assert!(obstacle_in(Features::SUBGROUP, sizes, 16384).is_none(), "{sizes:?}");
-        }
-        for (features, sizes, bytes, words) in [
-            (
-                Features::SUBGROUP,
-                [8, 32],
-                16384,
-                ["subgroups of 8 to 32 threads without barriers", "subgroups of one size"],
-            ),
-            (
-                Features::SUBGROUP,
-                [4, 64],
-                16384,
-                ["subgroups of 4 to 64 threads without barriers", "barriers for them"],
-            ),
-            (Features::SUBGROUP_BARRIER, [32, 32], 16384, ["a device without subgroups", "\"quads\""]),
-            (with_barriers, [2, 32], 16384, ["subgroups of 2 to 32 threads", "4 to 64"]),
-            (with_barriers, [32, 128], 16384, ["subgroups of 32 to 128 threads", "4 to 64"]),
-            (with_barriers, [32, 32], 16383, ["16383", "16384"]),
+    fn tiles_need_subgroups_only_where_barriers_must_be_proved() {
+        let none = Features::empty();
+        for (backend, features, bytes) in [
+            (Backend::Vulkan, none, 16384),
+            (Backend::Metal, none, 32768),
+            (Backend::Gl, none, 16384),
+            (Backend::Dx12, Features::SUBGROUP, 16384),
         ] {
-            let message = obstacle_in(features, sizes, bytes).map(|error| error.to_string()).unwrap_or_default();
+            assert!(obstacle_in(backend, features, bytes).is_none(), "{backend:?}");
+        }
+        for (backend, features, bytes, words) in [
+            (Backend::Dx12, none, 32768, ["Dx12 without subgroups", "\"quads\""]),
+            (Backend::BrowserWebGpu, none, 32768, ["without subgroups", "\"quads\""]),
+            (Backend::Vulkan, Features::SUBGROUP, 16383, ["16383", "16384"]),
+        ] {
+            let message = obstacle_in(backend, features, bytes).map(|error| error.to_string()).unwrap_or_default();
             words.iter().for_each(|word| assert!(message.contains(word), "no {word:?} in {message:?}"));
         }
     }

@@ -16,6 +16,7 @@ use crate::gpu::classified_volume::{ClassifiedVolume, Layer};
 use crate::gpu::hiding::Hiding;
 use crate::gpu::layout::{Band, FieldPlanes};
 use crate::gpu::ramps::{Integration, Ramps, Stored};
+use crate::gpu::shaders::Lanes;
 use crate::gpu::shown_bricks::BrickNeeds;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::uniforms;
@@ -24,7 +25,7 @@ use crate::image::channels::Joining;
 use crate::kernel::Kernel;
 use crate::lists::patch_bins::SHEETS;
 use crate::pass::composite::RayMode;
-use crate::pass::gather::most_workgroup_bytes;
+use crate::pass::gather::{lanes, least_lanes, most_workgroup_bytes};
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::shading::Gradient;
@@ -54,8 +55,9 @@ pub(crate) struct FrameRequest {
     pub(crate) kind: RasterizerKind,
     /// Why the device does not draw by tiles.
     pub(crate) fallback: Option<RenderError>,
-    /// The number of threads in the device's smallest subgroups.
-    pub(crate) subgroup_threads: u32,
+    /// The threads that draw a patch by tiles, and their least number.
+    pub(crate) lanes: Lanes,
+    pub(crate) least_lanes: u32,
     /// The bytes of workgroup memory that tiles may use.
     pub(crate) workgroup_bytes: u32,
     /// The bands of the compositing buffer.
@@ -151,7 +153,8 @@ impl FrameRequest {
             after,
             kind,
             fallback,
-            subgroup_threads: device.adapter_info().subgroup_min_size,
+            lanes: lanes(device),
+            least_lanes: least_lanes(device),
             workgroup_bytes: most_workgroup_bytes(device),
             covered: means::covered(&seen, grid, &splatting),
             kernel: Kernel::new(splatting.radius, splatting.falloff),

@@ -12,7 +12,7 @@ pub(super) fn of(request: &FrameRequest, by_label: bool) -> u32 {
         return if is_surface { surface_passes(request, after, by_label) } else { 0 };
     }
     let channels = request.ramps.channels;
-    let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.subgroup_threads);
+    let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.least_lanes);
     let searches = 1 + lengths.iter().map(|&points| of_search(points)).sum::<u32>();
     if in_memory { channels * (1 + searches) } else { 0 }
 }

@@ -393,7 +393,7 @@ fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) 
     let planes = after.as_ref().map(|after| &after.planes);
     let most_words = binding(limits) / 4;
     let (order, support) = (drawn_order(splatting), kernel.support());
-    let work = Work { search, threads: request.subgroup_threads, layers: layer_count(request) };
+    let work = Work { search, threads: request.least_lanes, layers: layer_count(request) };
     let of_groups = (covered.clone(), &drawn(request));
     Ok(PatchBins::new(bricks, (view, planes), order, of_groups, support, work, most_words)?)
 }
@@ -417,7 +417,7 @@ fn plane_mode(request: &FrameRequest) -> Option<PlaneMode> {
 
 /// Checks that a patch's pixels fit into a workgroup's memory, of which sums with the kernel's gradient need most.
 fn check_workgroup_memory(request: &FrameRequest) -> Result<(), RenderError> {
-    let (required, most) = (min_workgroup_bytes(plane_mode(request)), request.workgroup_bytes);
+    let (required, most) = (min_workgroup_bytes(plane_mode(request), request.lanes), request.workgroup_bytes);
     if required > most {
         let found = format!("\"tiles\" with sums of {required} bytes of workgroup memory");
         let allowed =

@@ -22,10 +22,12 @@ pub(crate) fn check_first_hit(opacity: f64) -> Result<(), SettingError> {
 const MAX_FALLOFF_AFTER: f64 = 11.0;
 
 /// The maximum of [`sheets_per_test`]: the sheets of a group that tiles draw on a GPU.
+#[cfg(any(feature = "cpu", feature = "gpu"))]
 const MOST_SHEETS_PER_TEST: f64 = 4.0;
 
 /// The number of sheets after which pixels are tested for being opaque, if each stops by itself ([`Classification::After`]): a small group of sheets (§6), of
 /// one `unit` in depth at most. A test after every thin sheet would stop pixels in the middle of a surface, just beyond the threshold.
+#[cfg(any(feature = "cpu", feature = "gpu"))]
 pub(crate) fn sheets_per_test(slab_width: f64) -> u32 {
     (1.0 / slab_width).clamp(1.0, MOST_SHEETS_PER_TEST) as u32
 }
@@ -141,9 +143,10 @@ pub enum Rasterizer {
     Auto,
     /// Footprint quads, drawn into sheet buffers (§3.2).
     Quads,
-    /// A compute stage in which every tile gathers its sections front to back. It needs subgroups of 4 to 64 threads
-    /// ([`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES); barriers for them only if they differ in size and some have fewer than 32), 16 KiB of workgroup
-    /// memory (WebGPU's default), and the summed-area form. After splatting, sums with the kernel's gradient or colours need 18 to 30 KiB, which tiles use on software drivers only.
+    /// A compute stage in which every tile gathers its sections front to back. It needs 16 KiB of workgroup memory
+    /// (WebGPU's default) and the summed-area form, and draws fastest with subgroups of 4 to 64 threads ([`TILE_FEATURES`](crate::gpu::device::TILE_FEATURES)). Without them threads share
+    /// values in workgroup memory; browsers have only quads, and DirectX 12 too where its compiler gives no subgroups. After splatting, sums with the kernel's gradient or colours need
+    /// 18 to 30 KiB, without subgroups sums of several channels, too; tiles use so much on software drivers only.
     Tiles,
 }
 

@@ -13,8 +13,15 @@ use sheetsplat::internals::gpu::shaders::{self, Shader};
 /// The capabilities of WebGPU core beyond naga's minimum: `pack2x16float` and its inverse, which WGSL always has.
 const WEBGPU_CORE: Capabilities = Capabilities::SHADER_FLOAT16_IN_FLOAT32;
 
-/// The only stages that need more, subgroups; on devices without them other stages draw frames.
-const WITH_SUBGROUPS: [Shader; 2] = [shaders::GATHER, shaders::GATHER_PLANES];
+/// What a shader needs beyond WebGPU core: subgroups where the lanes of a patch are one, and their barriers. Each such stage has a variant that needs
+/// neither.
+fn beyond_core(shader: &Shader) -> Capabilities {
+    let has = |file: &str| shader.files.iter().any(|&(path, _)| path == file);
+    let mut needed = Capabilities::empty();
+    needed.set(Capabilities::SUBGROUP, has("gather/subgroup_lanes.wgsl"));
+    needed.set(Capabilities::SUBGROUP_BARRIER, has("gather/subgroup_barrier.wgsl"));
+    needed
+}
 
 fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
     let failed = |line: Option<u32>, message: String| {
@@ -25,10 +32,8 @@ fn validated(shader: &Shader) -> Result<(Module, ModuleInfo), String> {
         let line = error.location(&shader.source()).map(|location| location.line_number);
         failed(line, error.emit_to_string_with_path(&shader.source(), shader.stage))
     })?;
-    let barriers = if shader.has_workgroup_barriers { Capabilities::empty() } else { Capabilities::SUBGROUP_BARRIER };
-    let has_subgroups = WITH_SUBGROUPS.iter().any(|of_subgroups| of_subgroups.stage == shader.stage);
-    let subgroups = if has_subgroups { Capabilities::SUBGROUP | barriers } else { Capabilities::empty() };
-    let info = Validator::new(ValidationFlags::all(), WEBGPU_CORE | subgroups).validate(&module).map_err(|error| {
+    let capabilities = WEBGPU_CORE | beyond_core(shader);
+    let info = Validator::new(ValidationFlags::all(), capabilities).validate(&module).map_err(|error| {
         let line = error.location(&shader.source()).map(|location| location.line_number);
         failed(line, error.emit_to_string_with_path(&shader.source(), shader.stage))
     })?;
@@ -60,10 +65,13 @@ fn assert_none(failures: &[String]) {
 
 #[test]
 fn every_shader_validates() {
-    let of_workgroups = WITH_SUBGROUPS.map(|shader| Shader { has_workgroup_barriers: true, ..shader });
-    let all = shaders::ALL.iter().chain(&of_workgroups);
-    let failures: Vec<_> = all.filter_map(|shader| validated(shader).err()).collect();
+    let failures: Vec<_> = shaders::ALL.iter().filter_map(|shader| validated(shader).err()).collect();
     assert_none(&failures);
+    let needs: Vec<Capabilities> = shaders::GATHER.iter().chain(&shaders::GATHER_PLANES).map(beyond_core).collect();
+    let [first, planes] = [&needs[..3], &needs[3..]];
+    let expected =
+        [Capabilities::SUBGROUP | Capabilities::SUBGROUP_BARRIER, Capabilities::SUBGROUP, Capabilities::empty()];
+    assert_eq!([first, planes], [&expected; 2], "in the order of `Lanes`");
 }
 
 #[test]
@@ -74,7 +82,6 @@ fn errors_name_the_file_and_the_line() {
             ("shared/one.wgsl", "fn first() {}\n\n"),
             ("broken.wgsl", "fn second() {}\nfn third() { nothing(); }\n"),
         ],
-        has_workgroup_barriers: false,
     };
     let error = validated(&broken).unwrap_err();
     assert!(error.starts_with("shaders/broken.wgsl:2: "), "{error}");
@@ -100,8 +107,9 @@ fn every_file_is_used() {
     };
     let unused: Vec<_> = files.iter().filter(|file| !is_used(file)).map(|file| file.display().to_string()).collect();
     assert_none(&unused);
-    let stages: BTreeSet<_> = shaders::ALL.iter().map(|shader| shader.stage).collect();
-    assert_eq!(stages.len(), shaders::ALL.len(), "every stage has a name of its own");
+    let names = |shader: &Shader| (shader.stage, shader.files.iter().map(|&(path, _)| path).collect::<Vec<_>>());
+    let stages: BTreeSet<_> = shaders::ALL.iter().map(names).collect();
+    assert_eq!(stages.len(), shaders::ALL.len(), "every stage has a name of its own, and its variants other files");
 }
 
 /// A shader is used by one file of `src/pass`, whose names of entry points and overrides only the shader can check. (Creating the pipelines
