@@ -24,21 +24,21 @@ fn nth_set_bit(bits: vec2u, n: u32) -> u32 {
 
 // The same within one word, by parallel sums of bits over groups of two, four and eight.
 fn nth_in_word(word: u32, n: u32) -> u32 {
-    let twos = word - (word >> 1u & 0x55555555u);
-    let fours = (twos & 0x33333333u) + (twos >> 2u & 0x33333333u);
+    let twos = word - ((word >> 1u) & 0x55555555u);
+    let fours = (twos & 0x33333333u) + ((twos >> 2u) & 0x33333333u);
     // In every byte, the number of bits set up to its end.
     let ends = ((fours + (fours >> 4u)) & 0x0f0f0f0fu) * 0x01010101u;
     // The top bits of the bytes that end before the n-th set bit.
-    let passed = ((n * 0x01010101u | 0x80808080u) - ends) & 0x80808080u;
-    var at = ((passed >> 7u) * 0x01010101u >> 24u) * 8u;
-    var left = n - (ends << 8u >> at & 255u);
-    var count = fours >> at & 15u;
+    let passed = (((n * 0x01010101u) | 0x80808080u) - ends) & 0x80808080u;
+    var at = (((passed >> 7u) * 0x01010101u) >> 24u) * 8u;
+    var left = n - (((ends << 8u) >> at) & 255u);
+    var count = (fours >> at) & 15u;
     var is_passed = left >= count;
     at += select(0u, 4u, is_passed);
     left -= select(0u, count, is_passed);
-    count = twos >> at & 3u;
+    count = (twos >> at) & 3u;
     is_passed = left >= count;
     at += select(0u, 2u, is_passed);
     left -= select(0u, count, is_passed);
-    return at + select(0u, 1u, left >= (word >> at & 1u));
+    return at + select(0u, 1u, left >= ((word >> at) & 1u));
 }

@@ -26,7 +26,7 @@ struct Pixels {
 
 // A mask of the halves of blocks, four threads each, in which a subgroup has the threads of a round.
 fn halves_of(thread: u32) -> u32 {
-    return united(1u << thread / 4u);
+    return united(1u << (thread / 4u));
 }
 
 fn pixels_of(corner: vec2u, thread: u32) -> Pixels {

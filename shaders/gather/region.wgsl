@@ -44,7 +44,7 @@ struct Bounds {
 }
 
 fn bounds_of(words: vec4u) -> Bounds {
-    let columns = columns_of(words.x | words.z) | columns_of(words.y | words.w) << 8u;
+    let columns = columns_of(words.x | words.z) | (columns_of(words.y | words.w) << 8u);
     let upper = words.x | words.y;
     let lower = words.z | words.w;
     let first_row = select(firstTrailingBit(upper) / 8u, 4u + firstTrailingBit(lower) / 8u, upper == 0u);
@@ -57,15 +57,15 @@ fn bounds_of(words: vec4u) -> Bounds {
 
 // A mask of the columns in which a block has a pixel.
 fn columns_of(word: u32) -> u32 {
-    let two = word | word >> 16u;
-    return (two | two >> 8u) & 255u;
+    let two = word | (word >> 16u);
+    return (two | (two >> 8u)) & 255u;
 }
 
 // A mask of the blocks in which the box around a footprint contains a pixel of the mask. Its centre is relative to the patch's first pixel.
 fn blocks_in_box(words: vec4u, center: vec2f, half_box: vec2f) -> u32 {
     let rows = run(vec4f(center.y), half_box.y, f32(PATCH_HEIGHT)).x;
     // A bit in the byte of every row that the box reaches.
-    let bytes = ((vec2u(rows) >> vec2u(0u, 4u)) & vec2u(15u)) * 0x204081u & vec2u(0x01010101u);
+    let bytes = (((vec2u(rows) >> vec2u(0u, 4u)) & vec2u(15u)) * 0x204081u) & vec2u(0x01010101u);
     let columns = run(vec4f(center.x), half_box.x, f32(PATCH_WIDTH)).x;
     let halves = vec2u(columns & 255u, columns >> 8u);
     return blocks_with(words, vec4u(bytes.x * halves, bytes.y * halves));
@@ -76,9 +76,9 @@ fn blocks_in_box(words: vec4u, center: vec2f, half_box: vec2f) -> u32 {
 fn blocks_in_parallelogram(words: vec4u, center: vec2f, half_box: vec2f, half_width: f32) -> u32 {
     let rows = run(vec4f(center.y), half_box.y, f32(PATCH_HEIGHT)).x;
     let columns = run(vec4f(center.x), half_box.x, f32(PATCH_WIDTH)).x;
-    let box = row_of_blocks(rows, columns, 0u, center, half_width) | row_of_blocks(rows, columns, 1u, center, half_width) << vec4u(8u)
-        | row_of_blocks(rows, columns, 2u, center, half_width) << vec4u(16u)
-        | row_of_blocks(rows, columns, 3u, center, half_width) << vec4u(24u);
+    let box = row_of_blocks(rows, columns, 0u, center, half_width) | (row_of_blocks(rows, columns, 1u, center, half_width) << vec4u(8u))
+        | (row_of_blocks(rows, columns, 2u, center, half_width) << vec4u(16u))
+        | (row_of_blocks(rows, columns, 3u, center, half_width) << vec4u(24u));
     return blocks_with(words, box);
 }
 
@@ -86,8 +86,8 @@ fn blocks_in_parallelogram(words: vec4u, center: vec2f, half_box: vec2f, half_wi
 fn row_of_blocks(rows: u32, columns: u32, row: u32, center: vec2f, half_width: f32) -> vec4u {
     let row_of = vec4u(row, row, row + 4u, row + 4u);
     let across = run(center.x + gather.shear * (vec4f(row_of) - center.y), half_width, f32(PATCH_WIDTH)) & vec4u(columns);
-    let is_reached = (vec4u(rows) >> row_of & vec4u(1u)) != vec4u(0u);
-    return select(vec4u(0u), across >> vec4u(0u, 8u, 0u, 8u) & vec4u(255u), is_reached);
+    let is_reached = ((vec4u(rows) >> row_of) & vec4u(1u)) != vec4u(0u);
+    return select(vec4u(0u), (across >> vec4u(0u, 8u, 0u, 8u)) & vec4u(255u), is_reached);
 }
 
 // A mask of the blocks in which two sets of pixels intersect.

@@ -91,7 +91,7 @@ fn find_handed_on(pixels: Pixels) {
 
 // Notes whether a thread's pixels have values on the plane that is handed on.
 fn note_handed_on(pixels: Pixels, is_any: bool) {
-    halves_handed_on |= united(select(0u, 1u << pixels.thread / 4u, is_any));
+    halves_handed_on |= united(select(0u, 1u << (pixels.thread / 4u), is_any));
 }
 
 // Removes a plane's values where the nearest voxel is a hole.
