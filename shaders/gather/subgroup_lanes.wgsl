@@ -1,5 +1,5 @@
-// The lanes that draw a patch, of which everything else in the tile rasterizer is told as of one: a subgroup. They read one another's registers.
-// `gather/workgroup_lanes.wgsl` has the same for devices without subgroups.
+// The lanes that draw a patch: a subgroup, as the other files call them. They read one another's registers. `gather/workgroup_lanes.wgsl` has the same
+// functions for devices without subgroups.
 //
 // Needs gather/patch.wgsl: THREADS, draw_of_workgroup, lane, lanes.
 // Needs gather/ramps.wgsl: Ramp.
@@ -9,7 +9,7 @@ fn of_lane(own: u32, other: u32) -> u32 {
     return subgroupShuffle(own, other);
 }
 
-// The number of the lane whose own number differs from this one's in some bits.
+// The same of the lane whose place differs from this one's in some bits.
 fn of_opposite(own: u32, bits: u32) -> u32 {
     return subgroupShuffleXor(own, bits);
 }
