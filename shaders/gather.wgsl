@@ -66,8 +66,8 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
             let amount = select(vec4f(0.0), queue_amounts[slot], i + lane < seen_count);
             let whole = whole_sheet(queue_blocks[slot]);
             let own = footprint_at(bitcast<vec4f>(queue_points[slot]), sheet_group.near, whole, amount);
-            // Every lane adds the sections of all voxels at its own pixels, two voxels at a time.
             hold_footprint(own);
+            // Every lane adds the sections of all voxels at its own pixels, two voxels at a time.
             let count = min(seen_count - i, lanes);
             passes += PASSES_PER_ADDITION + (count + 1u) / 2u;
             for (var j = 0u; j < count; j += 2u) {

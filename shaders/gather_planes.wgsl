@@ -174,8 +174,8 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
             if OWN_COLORS {
                 own.color = queue_colors[select(0u, slot, has_own_colors())];
             }
-            // Every lane adds all voxels at its own pixels, two at a time.
             hold_kernel(own);
+            // Every lane adds all voxels at its own pixels, two at a time.
             let count = min(seen_count - i, lanes);
             passes += PASSES_PER_ADDITION + (count + 1u) / 2u;
             for (var j = 0u; j < count; j += 2u) {

@@ -8,7 +8,7 @@ use crate::pass::composite::RayMode;
 use crate::pass::gather::{MOST_LAYERS, WORKGROUP_BYTES};
 use crate::settings::splatting::{Classification, FootprintBox, FootprintForm, Method, Rasterizer, Splatting};
 
-/// Whether tiles are compiled in: browsers have no barriers for subgroups, and a page's code must be short.
+/// Whether tiles are compiled in: browsers' compilers refuse their barriers, and a page's code must be short.
 pub(crate) const HAS_TILES: bool = cfg!(not(target_arch = "wasm32"));
 
 /// The rasterizer of a frame, which follows from the [`Rasterizer`] that the scene and the renderer name.
@@ -90,8 +90,8 @@ fn obstacle_in_device(device: &Device) -> Option<RenderError> {
 
 /// The same, given the device's API, its features, and its bytes of workgroup memory.
 fn obstacle_in(backend: Backend, features: Features, bytes: u32) -> Option<RenderError> {
-    // Without subgroups tiles need barriers in loops that only all threads together leave, which two compilers must be able to prove, and cannot: browsers', and DirectX 12's old
-    // one (FXC), the only one that gives no subgroups.
+    // Without subgroups tiles have barriers in loops that all threads leave together. Two compilers refuse barriers unless they can prove that, and cannot prove it:
+    // that of browsers, and FXC, DirectX 12's old one, by which a device has no subgroups.
     let needs_proof = matches!(backend, Backend::Dx12 | Backend::BrowserWebGpu);
     if !HAS_TILES || needs_proof && !features.contains(Features::SUBGROUP) {
         return refused_tiles(format!("{backend:?} without subgroups"), "\"quads\"");
