@@ -20,6 +20,8 @@
 @group(0) @binding(15) var<uniform> planes: FieldPlanes;
 // What pixels carry from plane to plane; see `shared/slab`.
 @group(0) @binding(16) var<storage, read_write> carried: array<vec4u>;
+// The slots of pages, where voxels are in pages.
+@group(0) @binding(17) var pages: texture_2d_array<u32>;
 
 var<private> cut: Cut;
 

@@ -8,6 +8,8 @@
 @group(0) @binding(6) var<storage, read> bricks: array<Brick>;
 // The colours of voxels; if `EXACT` the bits of the coefficients that interpolate them.
 @group(0) @binding(7) var colors: texture_2d_array<u32>;
+// The slots of pages, where voxels are in pages.
+@group(0) @binding(8) var pages: texture_2d_array<u32>;
 
 struct Quad {
     @builtin(position) position: vec4f,

@@ -11,6 +11,8 @@
 @group(0) @binding(6) var<storage, read_write> splats: array<Splat>;
 @group(0) @binding(7) var labels: texture_2d_array<u32>;
 @group(0) @binding(8) var colors: texture_2d_array<u32>;
+// The slots of pages, where voxels are in pages.
+@group(0) @binding(9) var pages: texture_2d_array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {

@@ -9,6 +9,8 @@
 @group(0) @binding(5) var<storage, read> args: Indirect;
 @group(0) @binding(6) var<storage, read_write> voxels: array<FieldVoxel>;
 @group(0) @binding(7) var<uniform> planes: FieldPlanes;
+// The slots of pages, where voxels are in pages.
+@group(0) @binding(8) var pages: texture_2d_array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {

@@ -39,6 +39,8 @@
 @group(0) @binding(12) var<storage, read_write> next: Indirect;
 @group(0) @binding(13) var<uniform> cut: Cut;
 @group(0) @binding(14) var surfaces: texture_depth_2d;
+// The slots of pages, where voxels are in pages.
+@group(0) @binding(18) var pages: texture_2d_array<u32>;
 
 // `frame.compositing` and `frame.order`.
 override COMPOSITING: u32 = 0u;

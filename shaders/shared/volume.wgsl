@@ -42,27 +42,26 @@ fn eighth(number: f32) -> f32 {
     return select(0.0, bitcast<f32>(bits - 0x1800000u), (bits & 0x7f800000u) > 0x1800000u);
 }
 
-// Half the difference along an axis in value per `unit`; one-sided at the border and beside a hole, 0 without a neighbour.
-fn half_difference(index: u32, stride: u32, at: u32, count: u32, scale: f32) -> f32 {
+// Half the difference along an axis in value per `unit`; one-sided at the border and beside a hole, 0 without a neighbour. The voxel is `at` steps from
+// the first of `count` along the axis.
+fn half_difference(voxel: vec3u, step: vec3u, at: u32, count: u32, scale: f32) -> f32 {
     var before = min(at, 1u);
     var after = min(count - 1u - at, 1u);
     if HOLES {
-        before = select(before, 0u, is_hole(stored_at(index - before * stride)));
-        after = select(after, 0u, is_hole(stored_at(index + after * stride)));
+        before = select(before, 0u, is_hole(stored_at(index_of(voxel - before * step))));
+        after = select(after, 0u, is_hole(stored_at(index_of(voxel + after * step))));
     }
     // Eighths, because values may be more than the largest f32 apart.
-    let difference = eighth(value_at(index + after * stride)) - eighth(value_at(index - before * stride));
+    let difference = eighth(value_at(index_of(voxel + after * step))) - eighth(value_at(index_of(voxel - before * step)));
     return difference * select(8.0 * scale, 4.0 * scale, before + after == 2u);
 }
 
 // Half of the central differences in the unwarped space (§4.2, SPEC §3), value per `unit`.
 fn half_differences(voxel: vec3u) -> vec3f {
-    let index = index_of(voxel);
-    let row = frame.dims.x;
     return vec3f(
-        half_difference(index, 1u, voxel.x, frame.dims.x, frame.gradient.x),
-        half_difference(index, row, voxel.y, frame.dims.y, frame.gradient.y),
-        half_difference(index, row * frame.dims.y, voxel.z, frame.dims.z, frame.gradient.z),
+        half_difference(voxel, vec3u(1u, 0u, 0u), voxel.x, frame.dims.x, frame.gradient.x),
+        half_difference(voxel, vec3u(0u, 1u, 0u), voxel.y, frame.dims.y, frame.gradient.y),
+        half_difference(voxel, vec3u(0u, 0u, 1u), voxel.z, frame.dims.z, frame.gradient.z),
     );
 }
 

@@ -13,7 +13,7 @@ use crate::gpu::counts::{GroupSlabs, Totals};
 use crate::gpu::gpu_volume::GpuVolume;
 use crate::gpu::ramps::Stored;
 use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks, opaque_values};
-use crate::gpu::volume_texture::OwnColors;
+use crate::gpu::volume_texture::{OwnColors, Pages};
 use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
 use crate::lists::classify::{TakingPart, brick_list, channels, in_rows};
@@ -113,6 +113,9 @@ impl ClassifiedVolume {
 
     /// The bricks that each list holds; with [`Classification::After`] none yet.
     fn taking_part(&self) -> Vec<BrickList> {
+        if let Some(given) = self.volume.given_lists() {
+            return given.to_vec();
+        }
         let bricks = |(volume, transfer): (&Volume, Cow<'_, TransferFunction>)| match self.classification {
             Classification::After => BrickList::new(volume.grid(), &[]),
             _ => brick_list(volume, &transfer, &self.clipped),
@@ -158,7 +161,7 @@ impl ClassifiedVolume {
     /// Lists the bricks that a frame may draw. A changed transfer function tests bricks anew; their values are looked at only where what a
     /// frame needs is new.
     pub(crate) fn show(&mut self, needs: &BrickNeeds) {
-        if self.shown.as_ref().is_some_and(|shown| shown.needs == *needs) {
+        if self.is_shown(needs) {
             return;
         }
         let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
@@ -169,10 +172,15 @@ impl ClassifiedVolume {
         self.shown = Some(shown);
     }
 
+    /// Whether the lists are those that a frame needs.
+    fn is_shown(&self, needs: &BrickNeeds) -> bool {
+        self.volume.given_lists().is_some() || self.shown.as_ref().is_some_and(|shown| shown.needs == *needs)
+    }
+
     /// What [`Self::show`] would list, for every list.
     pub(crate) fn settled_for(&self, limits: &Limits, needs: Option<&BrickNeeds>) -> Vec<SettledBricks> {
         match needs {
-            Some(needs) if self.shown.as_ref().is_none_or(|shown| shown.needs != *needs) => {
+            Some(needs) if !self.is_shown(needs) => {
                 let shown = ShownBricks::new(self.volume(), &self.transfer, needs);
                 let lists = shown.lists(self.volume());
                 lists.into_iter().map(|bricks| SettledBricks::of(limits, bricks)).collect()
@@ -196,6 +204,11 @@ impl ClassifiedVolume {
     /// Makes the next [`Self::flush`] upload everything again, because the buffers may have been lost.
     pub(crate) fn forget(&mut self) {
         self.lists.iter_mut().for_each(BrickLists::forget);
+    }
+
+    /// The slots of pages, where voxels are in pages.
+    pub(crate) fn pages(&self) -> Option<Pages<'_>> {
+        self.volume.pages()
     }
 
     /// The values of all channels on the GPU.

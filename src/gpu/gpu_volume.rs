@@ -11,7 +11,8 @@ use crate::error::setting::SettingError;
 use crate::gpu::coefficients::Coefficients;
 use crate::gpu::fault::scoped;
 use crate::gpu::ramps::Stored;
-use crate::gpu::volume_texture::{OwnColors, ValueFormat, VolumeTexture};
+use crate::gpu::volume_texture::{OwnColors, Pages, ValueFormat, VolumeTexture};
+use crate::lists::brick::BrickList;
 use crate::lists::value_list::ValueList;
 use crate::volume::{Texel, ValueSlice, Volume};
 
@@ -35,6 +36,26 @@ struct Shared {
     numbers: OnceLock<Vec<Normalization>>,
     /// Those of the kernel that was last asked for.
     coefficients: Mutex<Option<KeptCoefficients>>,
+    /// Where the volume holds no voxels, and pages of them are on the device.
+    pages: Option<Paged>,
+}
+
+/// Of a volume that is read while it is drawn, what is on a device: pages of a box of its voxels, all that bear on what is drawn of it.
+#[derive(Debug)]
+#[cfg_attr(target_arch = "wasm32", expect(dead_code, reason = "browsers draw what is in memory"))]
+pub(crate) struct Paged {
+    /// The slots of the box's pages, of each channel's values, then of labels, then of colours.
+    pub(crate) slots: VolumeTexture,
+    /// The bits of a voxel's place in its page along each axis.
+    pub(crate) bits: u32,
+    /// What slots hold.
+    pub(crate) values: VolumeTexture,
+    pub(crate) labels: Option<VolumeTexture>,
+    pub(crate) colors: Option<(VolumeTexture, u32)>,
+    /// Of each channel's values.
+    pub(crate) numbers: Vec<Normalization>,
+    /// The voxels that are drawn: what [`ClassifiedVolume::lists`](super::classified_volume::ClassifiedVolume) would be of the box in memory.
+    pub(crate) lists: Vec<BrickList>,
 }
 
 /// The coefficients for a kernel's radius and falloff.
@@ -73,13 +94,42 @@ impl GpuVolume {
         let colors = colors.transpose()?.transpose()?;
         let (device, labels, value_list) = (device.clone(), OnceLock::new(), OnceLock::new());
         let (numbers, coefficients) = (OnceLock::new(), Mutex::default());
-        let shared = Shared { device, volume, values, colors, labels, value_list, numbers, coefficients };
+        Ok(Self::sharing(Shared {
+            device,
+            volume,
+            values,
+            colors,
+            labels,
+            value_list,
+            numbers,
+            coefficients,
+            pages: None,
+        }))
+    }
+
+    /// A volume without voxels ([`Volume::hollow`]), with pages of them on a device. Only frames can be drawn of it: nothing that needs its values on the CPU.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(crate) fn paged(device: &Device, volume: Volume, mut pages: Paged) -> Self {
+        Self::sharing(Shared {
+            device: device.clone(),
+            volume: Arc::new(volume),
+            values: pages.values.clone(),
+            colors: pages.colors.clone(),
+            labels: pages.labels.clone().map_or_else(OnceLock::new, OnceLock::from),
+            value_list: OnceLock::new(),
+            numbers: std::mem::take(&mut pages.numbers).into(),
+            coefficients: Mutex::default(),
+            pages: Some(pages),
+        })
+    }
+
+    fn sharing(shared: Shared) -> Self {
         #[cfg_attr(
             target_family = "wasm",
             expect(clippy::arc_with_non_send_sync, reason = "a browser's wgpu belongs to one thread")
         )]
         let shared = Arc::new(shared);
-        Ok(Self { shared })
+        Self { shared }
     }
 
     /// What [`Self::gpu_bytes`] of a volume will be, before and after a view shades by label. Examines all values.
@@ -141,6 +191,22 @@ impl GpuVolume {
         self.shared.colors.as_ref().map(|(texture, full)| OwnColors { view: &texture.view, full: *full })
     }
 
+    /// The slots of pages, where voxels are in pages.
+    pub(crate) fn pages(&self) -> Option<Pages<'_>> {
+        self.in_pages().map(|pages| Pages { view: &pages.slots.view, bits: pages.bits })
+    }
+
+    /// What is drawn of a volume in pages.
+    pub(crate) fn given_lists(&self) -> Option<&[BrickList]> {
+        self.in_pages().map(|pages| &pages.lists[..])
+    }
+
+    /// The pages, where voxels are in pages. In a browser, where code must be short, they never are.
+    #[inline(always)]
+    fn in_pages(&self) -> Option<&Paged> {
+        self.shared.pages.as_ref().filter(|_| !cfg!(target_arch = "wasm32"))
+    }
+
     /// The labels of all segmented channels, one channel after the other, `R16Uint`, if they were uploaded.
     pub(crate) fn labels(&self) -> Option<&TextureView> {
         self.shared.labels.get().map(|labels| &labels.view)
@@ -148,7 +214,8 @@ impl GpuVolume {
 
     /// Where each channel's labels and colours are among these.
     pub(crate) fn stored(&self) -> Vec<Stored> {
-        let mut before = Stored { labels: 0, colors: 0 };
+        let [labels, colors] = self.first_stored();
+        let mut before = Stored { labels, colors };
         let stored = |channel: &Volume| {
             let has = [channel.labels().is_some(), channel.colors().is_some()];
             before.labels += u32::from(has[0]);
@@ -157,6 +224,16 @@ impl GpuVolume {
             Stored { labels: number(has[0], before.labels), colors: number(has[1], before.colors) }
         };
         self.shared.volume.channels().map(stored).collect()
+    }
+
+    /// How many channels come before the first one's labels, and before the first one's colours: where voxels are in pages all share one count of slots.
+    fn first_stored(&self) -> [u32; 2] {
+        if self.in_pages().is_none() {
+            return [0; 2];
+        }
+        let channels = || self.shared.volume.channels();
+        let (all, labelled) = (channels().count(), channels().filter(|channel| channel.labels().is_some()).count());
+        [all as u32, (all + labelled) as u32]
     }
 
     /// What each channel's values are splatted as where they are classified afterwards (SPEC §9).

@@ -40,7 +40,7 @@ macro_rules! text {
     };
 }
 
-/// The text of a file without comments and indents, because a page's code must be short. Lines stay, so that messages name the right ones.
+/// The text of a file without comments, indents and spaces beside signs, because a page's code must be short. Lines stay, so that messages name the right ones.
 #[cfg(target_arch = "wasm32")]
 macro_rules! text {
     ($file:expr) => {{
@@ -56,19 +56,30 @@ macro_rules! text {
 
 #[cfg(target_arch = "wasm32")]
 mod comments {
-    /// The bytes of a text without its comments and indents, and their number. WGSL has no strings.
+    /// The bytes of a text without its comments, indents and spaces beside signs, and their number. WGSL has no strings.
     pub(super) const fn without<const N: usize>(text: &str) -> ([u8; N], usize) {
         let (text, mut code, mut count, mut at, mut is_comment) = (text.as_bytes(), [0; N], 0, 0, false);
         while at < N {
             is_comment = text[at] != b'\n' && (is_comment || text[at] == b'/' && at + 1 < N && text[at + 1] == b'/');
             let is_indent = text[at] == b' ' && (count == 0 || code[count - 1] == b'\n');
-            if !is_comment && !is_indent {
+            // A space may divide two signs that would be another one together, `> =` or `- -`.
+            let is_beside_sign = text[at] == b' ' && count > 0 && at + 1 < N && {
+                let (before, after) = (code[count - 1], text[at + 1]);
+                (is_sign(before) || is_sign(after))
+                    && !(matches!(before, b'<' | b'>') && after == b'=')
+                    && !(before == b'-' && after == b'-')
+            };
+            if !is_comment && !is_indent && !is_beside_sign {
                 code[count] = text[at];
                 count += 1;
             }
             at += 1;
         }
         (code, count)
+    }
+
+    const fn is_sign(byte: u8) -> bool {
+        matches!(byte, b'%'..=b'/' | b':'..=b'>' | b'[' | b']' | b'{'..=b'}') && byte != b'.'
     }
 
     pub(super) const fn first<const N: usize>(bytes: &[u8]) -> [u8; N] {

@@ -43,6 +43,12 @@ impl PartialEq for BrickNeeds {
     }
 }
 
+/// The voxels of each channel of a volume that a frame may draw.
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) fn shown_lists(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Vec<BrickList> {
+    ShownBricks::new(volume, transfer, needs).lists(volume)
+}
+
 impl ShownBricks {
     pub(super) fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
         let mut shown = Self { needs: needs.clone(), ranges: Vec::new(), values: opaque_values(volume, transfer) };

@@ -40,7 +40,8 @@ impl ValueFormat {
         }
     }
 
-    fn texture(self) -> TextureFormat {
+    /// The format of texels.
+    pub(crate) fn texture(self) -> TextureFormat {
         match self {
             Self::Offset8(_) => TextureFormat::R8Uint,
             Self::Offset16(_) => TextureFormat::R16Uint,
@@ -58,6 +59,20 @@ pub struct OwnColors<'a> {
     pub full: u32,
 }
 
+/// The slots of pages, where voxels are in pages ([`PagePool`](super::page_pool::PagePool)).
+#[derive(Clone, Copy, Debug)]
+pub struct Pages<'a> {
+    /// `R32Uint`, a slot for every page, folded as voxels are: the pages of each channel's values, x fastest, then those of labels, then those of colours.
+    pub view: &'a TextureView,
+    /// The bits of a voxel's place in its page along each axis.
+    pub bits: u32,
+}
+
+/// The bits of a voxel's place in its page along each axis; 0 where voxels are not in pages.
+pub fn page_bits(pages: Option<Pages<'_>>) -> u32 {
+    pages.map_or(0, |pages| pages.bits)
+}
+
 /// The format of four numbers for each voxel.
 const COLOR_BITS: TextureFormat = TextureFormat::Rgba32Uint;
 
@@ -66,7 +81,7 @@ const LABELS: ValueFormat = ValueFormat::Offset16(0.0);
 
 /// One number per voxel, x fastest, folded into square layers whose side is a power of two: voxel i is texel i mod side of row ⌊i/side⌋.
 /// `shaders/shared/volume.wgsl` unfolds it.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct VolumeTexture {
     /// All layers.
     pub view: TextureView,
@@ -149,6 +164,34 @@ impl VolumeTexture {
             ValueFormat::Bits => fill_values(queue, &texture, values, f32::to_bits, written),
         }
         uploaded
+    }
+
+    /// Uploads the slots of pages.
+    ///
+    /// # Errors
+    /// If they need more layers than the device's textures have.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(crate) fn upload_slots(device: &Device, queue: &Queue, slots: &[u32]) -> Result<Self, RenderError> {
+        let side = side(&device.limits(), "the slots of pages", slots.len() as u64)?;
+        let size = folded(slots.len() as u64, side);
+        let (texture, uploaded) = Self::new(device, "sheetsplat.pages", ValueFormat::Bits, size);
+        fill_from(queue, &texture, slots, |slot| slot);
+        Ok(uploaded)
+    }
+
+    /// A texture with room for a number of texels, and itself.
+    ///
+    /// # Errors
+    /// If it needs more layers than the device's textures have.
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(crate) fn with_room(
+        device: &Device,
+        label: &'static str,
+        (format, texels): (ValueFormat, TextureFormat),
+        count: u64,
+    ) -> Result<(wgpu::Texture, Self), RenderError> {
+        let side = side(&device.limits(), label, count)?;
+        Ok(Self::new_as(device, label, format, texels, folded(count, side)))
     }
 
     /// Uploads the labels of segmented channels, one channel after the other, `R16Uint`.

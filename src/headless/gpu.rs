@@ -150,10 +150,33 @@ impl GpuHeadless {
         window: &Window,
         closed: Option<&[bool]>,
     ) -> Result<(Content, Stats), RenderError> {
-        let mut view = self.view(volume, scene)?;
+        self.draw_behind(self.view(volume, scene)?, window, closed)
+    }
+
+    fn draw_behind(
+        &self,
+        mut view: SceneView,
+        window: &Window,
+        closed: Option<&[bool]>,
+    ) -> Result<(Content, Stats), RenderError> {
         let upload = |closed| ClosedPixels::upload(&self.device, &self.queue, &window.region, closed);
         view.hiding = closed.map(upload).map(Hiding::Closed);
         self.draw_content(&mut view, window)
+    }
+
+    /// Draws a window of a volume in pages to those pixels, row by row, that are not closed.
+    ///
+    /// # Errors
+    /// As for [`Self::view`] and [`Self::draw`].
+    #[cfg(not(target_arch = "wasm32"))]
+    pub(super) fn draw_pages(
+        &self,
+        volume: &GpuVolume,
+        scene: &Scene,
+        window: &Window,
+        closed: Option<&[bool]>,
+    ) -> Result<(Content, Stats), RenderError> {
+        self.draw_behind(SceneView::new(&self.device, volume, scene)?, window, closed)
     }
 
     /// Draws the pixels of a part, without first hits, and returns them with statistics.

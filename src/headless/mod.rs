@@ -278,6 +278,17 @@ impl Headless {
         }
     }
 
+    /// The GPU, if that draws.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    fn gpu(&self) -> Option<&GpuHeadless> {
+        match &self.drawer {
+            Drawer::Gpu(gpu) => Some(gpu),
+            #[cfg(feature = "cpu")]
+            Drawer::Cpu => None,
+            Drawer::Reference => None,
+        }
+    }
+
     /// Whether views of the CPU are drawn.
     #[cfg(feature = "cpu")]
     fn draws_by_cpu(&self) -> bool {

@@ -86,6 +86,17 @@ impl BrickList {
         Self { grid: *grid, numbers, bricks }
     }
 
+    /// Some bricks of a grid, each given once, with their boxes fitted.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(crate) fn of_bricks(grid: &Grid, mut bricks: Vec<Brick>) -> Self {
+        bricks.par_sort_unstable_by_key(position);
+        let mut numbers = vec![NONE; bricks_per_axis(grid).element_product() as usize];
+        for (brick, number) in bricks.iter().zip(0..) {
+            numbers[brick_of(grid, grid.index_of(origin(brick))) as usize] = number;
+        }
+        Self { grid: *grid, numbers, bricks }
+    }
+
     /// The voxels, as indices into the volume, brick by brick.
     pub fn voxels(&self) -> Vec<u32> {
         self.bricks.iter().flat_map(voxels).map(|(_, voxel)| self.grid.index_of(voxel)).collect()

@@ -3,6 +3,8 @@
 #[cfg(target_arch = "wasm32")]
 mod sequential;
 
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+pub(crate) use rayon::join;
 #[cfg(all(feature = "cpu", not(target_arch = "wasm32")))]
 pub(crate) use rayon::{ThreadPool, ThreadPoolBuilder};
 #[cfg(not(target_arch = "wasm32"))]

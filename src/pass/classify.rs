@@ -10,7 +10,7 @@ use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
 use crate::gpu::layout::FieldPlanes;
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
-use crate::gpu::volume_texture::VolumeTexture;
+use crate::gpu::volume_texture::{Pages, VolumeTexture};
 use crate::settings::shading::Gradient;
 
 /// The stage's pipelines, each compiled when it is first needed.
@@ -31,6 +31,8 @@ pub struct ClassifyMode {
     pub labels: bool,
     /// Whether any voxel is a hole.
     pub holes: bool,
+    /// The bits of a voxel's place in its page along each axis; 0 where voxels are not in pages.
+    pub page_bits: u32,
     /// The number of channels that share sheets (SPEC §10).
     pub channels: u32,
     /// Whether voxels of any channel have colours of their own.
@@ -48,6 +50,8 @@ pub struct ClassifyBuffers<'a> {
     pub planes: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// The slots of pages, where voxels are in pages.
+    pub pages: Option<Pages<'a>>,
     /// The volume's labels, if any of them has its own tables.
     pub labels: Option<&'a TextureView>,
 }
@@ -81,7 +85,7 @@ impl Classify {
         buffers: ClassifyBuffers<'_>,
         (band, carried): (&BandBuffer, &Buffer),
     ) -> ClassifyGroup {
-        let ClassifyBuffers { composite, control_points, planes, values, labels } = buffers;
+        let ClassifyBuffers { composite, control_points, planes, values, pages, labels } = buffers;
         let texture = BindingResource::TextureView;
         let own = [
             ("control_points", control_points.as_entire_binding()),
@@ -89,6 +93,7 @@ impl Classify {
             ("values", texture(values)),
             ("planes", planes.as_entire_binding()),
             ("carried", carried.as_entire_binding()),
+            ("pages", texture(pages.map_or(values, |pages| pages.view))),
         ];
         let resources = [&composite.resources(band)[..], &own].concat();
         let stage = self.compiled(device, mode);
@@ -104,7 +109,7 @@ impl Classify {
 }
 
 fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
-    let ClassifyMode { composite, gradient, labels, holes, channels, own_colors } = mode;
+    let ClassifyMode { composite, gradient, labels, holes, page_bits, channels, own_colors } = mode;
     let stage = ShaderStages::COMPUTE;
     let own = [
         ("control_points", storage::<[f32; 4]>(stage, true)),
@@ -112,6 +117,7 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
         ("values", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("planes", uniform::<FieldPlanes>(stage, false)),
         ("carried", storage::<[u32; 4]>(stage, false)),
+        ("pages", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
     let slots = [&slots()[..], &own].concat();
     let flag = |is_set| f64::from(u8::from(is_set));
@@ -119,6 +125,7 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
         ("KERNEL_GRADIENT", flag(gradient == Gradient::Kernel)),
         ("LABELS", flag(labels)),
         ("HOLES", flag(holes)),
+        ("PAGE_BITS", f64::from(page_bits)),
         ("CHANNELS", f64::from(channels)),
         ("OWN_COLORS", flag(own_colors)),
     ];

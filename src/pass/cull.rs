@@ -8,7 +8,7 @@ use crate::gpu::bindings::{BufferSpec, ComputeStage, at_offset, buffer_spec, gro
 use crate::gpu::brick_lists::BrickBuffer;
 use crate::gpu::layout::{Brick, BrickState, Culled, Frame, Indirect, SheetGroup, Splat, Visit};
 use crate::gpu::shaders;
-use crate::gpu::volume_texture::OwnColors;
+use crate::gpu::volume_texture::{OwnColors, Pages};
 use crate::lists::brick::BRICK_VOXELS;
 use crate::pass::shade::{Shade, ShadeBuffers, ShadeGroup};
 use crate::pass::values::{PlaneBuffers, Values, ValuesBuffers, ValuesGroup};
@@ -25,8 +25,8 @@ pub struct Cull {
 /// What becomes of voxels that are drawn for the first time.
 #[derive(Debug)]
 enum VoxelStage {
-    Shade(Shade),
-    Values(Values),
+    Shade(Box<Shade>),
+    Values(Box<Values>),
 }
 
 /// One list's buffers and bind groups.
@@ -64,6 +64,8 @@ pub struct CullBuffers<'a> {
     pub groups: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// The slots of pages, where voxels are in pages.
+    pub pages: Option<Pages<'a>>,
     /// Whether any value is a hole.
     pub has_holes: bool,
     /// The number of channels (SPEC §10).
@@ -85,12 +87,12 @@ pub struct CullBuffers<'a> {
 impl Cull {
     /// Compiles the stages for groups of `sheets` sheets.
     pub fn new(device: &Device, sheets: u32) -> Self {
-        Self::compiled(device, sheets, VoxelStage::Shade(Shade::new(device)))
+        Self::compiled(device, sheets, VoxelStage::Shade(Box::new(Shade::new(device))))
     }
 
     /// Compiles the stages for groups that are single planes (SPEC §9).
     pub fn of_planes(device: &Device) -> Self {
-        Self::compiled(device, 1, VoxelStage::Values(Values::default()))
+        Self::compiled(device, 1, VoxelStage::Values(Box::default()))
     }
 
     fn compiled(device: &Device, sheets: u32, prepared: VoxelStage) -> Self {
@@ -216,6 +218,7 @@ impl Cull {
                     frame: shared.frame,
                     bricks: &list.buffer,
                     values: shared.values,
+                    pages: shared.pages,
                     has_holes: shared.has_holes,
                     channels: shared.channels,
                     colors: shared.colors,
@@ -233,6 +236,7 @@ impl Cull {
                     frame: shared.frame,
                     bricks: &list.buffer,
                     values: shared.values,
+                    pages: shared.pages,
                     has_holes: shared.has_holes,
                     planes,
                     places: &fresh,

@@ -14,6 +14,7 @@ use crate::gpu::bindings::{Bindings, at_offset, storage, texture_of_integers, un
 use crate::gpu::layout::{Brick, FieldPlanes, FieldVoxel, Frame, Indirect, SheetGroup};
 use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
+use crate::gpu::volume_texture::Pages;
 use crate::pass::cull::CullList;
 
 /// The stage's pipelines: one that zeroes tiles, and those that draw.
@@ -34,6 +35,8 @@ pub struct ColorMode {
     pub full: u32,
     /// Whether they are the bits of coefficients.
     pub is_exact: bool,
+    /// The bits of a voxel's place in its page along each axis; 0 where voxels are not in pages.
+    pub page_bits: u32,
 }
 
 /// The buffers of one list.
@@ -49,6 +52,8 @@ pub struct FieldColorsBuffers<'a> {
     pub bricks: &'a Buffer,
     /// What the mode says.
     pub colors: &'a TextureView,
+    /// The slots of pages, where voxels are in pages.
+    pub pages: Option<Pages<'a>>,
 }
 
 /// Bound buffers.
@@ -71,6 +76,7 @@ impl FieldColors {
             ("planes", uniform::<FieldPlanes>(vertex, false)),
             ("bricks", storage::<Brick>(vertex, true)),
             ("colors", texture_of_integers(vertex, TextureViewDimension::D2Array)),
+            ("pages", texture_of_integers(vertex, TextureViewDimension::D2Array)),
         ];
         Self {
             clear: Clear::new(device, format, 1),
@@ -84,8 +90,12 @@ impl FieldColors {
     fn pipeline(&self, device: &Device, mode: ColorMode) -> Arc<RenderPipeline> {
         let compile = || {
             let sheets = sheets_of_a_group(self.format, 1, Some(added_to(wgpu::BlendFactor::One)));
-            let ColorMode { full, is_exact } = mode;
-            let constants = [("FULL_COLOR", f64::from(full)), ("EXACT", f64::from(u8::from(is_exact)))];
+            let ColorMode { full, is_exact, page_bits } = mode;
+            let constants = [
+                ("FULL_COLOR", f64::from(full)),
+                ("EXACT", f64::from(u8::from(is_exact))),
+                ("PAGE_BITS", f64::from(page_bits)),
+            ];
             let entries = (shaders::FIELD_COLORS, ["vertex", "fragment"]);
             Arc::new(render_pipeline(device, entries, &self.bindings.pipeline_layout, &sheets, &constants))
         };
@@ -106,7 +116,7 @@ impl FieldColors {
         buffers: FieldColorsBuffers<'_>,
         list: &CullList,
     ) -> FieldColorsGroup {
-        let FieldColorsBuffers { frame, groups, planes, bricks, colors } = buffers;
+        let FieldColorsBuffers { frame, groups, planes, bricks, colors, pages } = buffers;
         let resources = [
             ("frames", frame.as_entire_binding()),
             ("sheet_group", at_offset::<SheetGroup>(groups)),
@@ -116,6 +126,7 @@ impl FieldColors {
             ("planes", planes.as_entire_binding()),
             ("bricks", bricks.as_entire_binding()),
             ("colors", BindingResource::TextureView(colors)),
+            ("pages", BindingResource::TextureView(pages.map_or(colors, |pages| pages.view))),
         ];
         FieldColorsGroup { group: self.bindings.bind(device, &resources), pipeline: self.pipeline(device, mode) }
     }

@@ -1,22 +1,22 @@
 //! Draws patches front to back: the single stage of the tile rasterizer, which culls, splats and composites (§6).
 
 use std::collections::HashMap;
-use std::ops::RangeInclusive;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use wgpu::{
-    BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePass, Device, DeviceType, Features, ShaderStages,
-    TextureView, TextureViewDimension,
+    BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePass, Device, DeviceType, ShaderStages, TextureView,
+    TextureViewDimension,
 };
 
 use super::composite::{CutBuffers, RayMode};
+use super::lanes::{PATCH_THREADS, lanes, threads};
 use crate::gpu::bindings::{
     ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture_of_integers, uniform,
 };
 use crate::gpu::layout::{Brick, Cut, FieldPlanes, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange};
 use crate::gpu::shaders::{self, Lanes};
-use crate::gpu::volume_texture::{OwnColors, VolumeTexture};
-use crate::lists::patch_bins::{PATCH, SHEETS};
+use crate::gpu::volume_texture::{OwnColors, Pages, VolumeTexture, page_bits};
+use crate::lists::patch_bins::SHEETS;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::{Classification, Compositing, FootprintBox, Order, Splatting, sheets_per_test};
 
@@ -38,6 +38,7 @@ pub struct GatherMode {
     economies: bool,
     labels: bool,
     holes: bool,
+    page_bits: u32,
     channels: u32,
     /// The number in the voxels' own colours that stands for 1; 0 if they have none.
     full_color: u32,
@@ -88,7 +89,7 @@ impl GatherMode {
         let footprint_box = if perspective { FootprintBox::Rectangle } else { footprint_box };
         let divided = workgroups > 1;
         let sheets_per_test = planes.map_or(SHEETS, |_| sheets_per_test(splatting.slab_width));
-        let (channels, full_color) = (1, 0);
+        let (channels, full_color, page_bits) = (1, 0, 0);
         Self {
             compositing,
             order,
@@ -97,6 +98,7 @@ impl GatherMode {
             economies,
             labels,
             holes,
+            page_bits,
             channels,
             full_color,
             rays,
@@ -109,6 +111,11 @@ impl GatherMode {
     /// The same mode for another number of channels, and for voxels with colours of their own (SPEC §10).
     pub fn with_channels(self, channels: u32, colors: Option<OwnColors<'_>>) -> Self {
         Self { channels, full_color: colors.map_or(0, |own| own.full), ..self }
+    }
+
+    /// The same mode for voxels in pages.
+    pub fn with_pages(self, pages: Option<Pages<'_>>) -> Self {
+        Self { page_bits: page_bits(pages), ..self }
     }
 }
 
@@ -140,6 +147,8 @@ pub struct GatherBuffers<'a> {
     pub control_points: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// The slots of pages, where voxels are in pages.
+    pub pages: Option<Pages<'a>>,
     /// The voxels' own colours, for a mode that needs them.
     pub colors: Option<OwnColors<'a>>,
     /// The volume's labels, for a mode that needs them.
@@ -206,6 +215,8 @@ impl Gather {
         let none = || &self.no_colors.get_or_init(|| VolumeTexture::no_colors(device)).view;
         let colors = buffers.colors.map_or_else(none, |own| own.view);
         resources.push(("colors", wgpu::BindingResource::TextureView(colors)));
+        let pages = buffers.pages.map_or(values, |pages| pages.view);
+        resources.push(("pages", wgpu::BindingResource::TextureView(pages)));
         if let Some(GatheredPlanes { planes, coefficients }) = buffers.planes {
             resources.push(("planes_of", whole(planes)));
             resources.push(("coefficients", wgpu::BindingResource::TextureView(coefficients.unwrap_or(values))));
@@ -242,6 +253,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("cut", uniform::<Cut>(stage, false)),
         ("surfaces", depth_texture(stage)),
         ("colors", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("pages", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
     if mode.planes.is_some() {
         slots.push(("planes_of", uniform::<[FieldPlanes; MOST_LAYERS]>(stage, false)));
@@ -258,6 +270,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("PARALLELOGRAM", f64::from(mode.footprint_box as u32)),
         ("LABELS", f64::from(u8::from(mode.labels))),
         ("HOLES", f64::from(u8::from(mode.holes))),
+        ("PAGE_BITS", f64::from(mode.page_bits)),
         ("CHANNELS", f64::from(mode.channels)),
         ("FULL_COLOR", f64::from(mode.full_color)),
         ("CUT", f64::from(u8::from(mode.rays.cut))),
@@ -296,47 +309,6 @@ pub const WORKGROUP_BYTES: u32 = 16384;
 /// Workgroups that a patch is divided among: one for every round of its threads, or one for all.
 fn workgroups_per_patch(device: &Device, mode: GatherMode) -> u32 {
     if mode.divided { PATCH_THREADS / threads(device) } else { 1 }
-}
-
-/// The number of threads that hold a patch, four pixels each.
-const PATCH_THREADS: u32 = PATCH[0] * PATCH[1] / 4;
-
-/// The number of threads in a workgroup: those of the largest subgroup, but at most those that hold a patch.
-fn threads(device: &Device) -> u32 {
-    let least = if lanes(device) == Lanes::Workgroup { LEAST_LANES } else { 1 };
-    device.adapter_info().subgroup_max_size.clamp(least, PATCH_THREADS)
-}
-
-/// The least number of threads that draw a patch together on a device.
-pub fn least_lanes(device: &Device) -> u32 {
-    let smallest = device.adapter_info().subgroup_min_size;
-    if lanes(device) == Lanes::Workgroup { threads(device) } else { smallest }
-}
-
-/// The least threads of a workgroup that is not divided into subgroups.
-const LEAST_LANES: u32 = 8;
-
-/// The sizes of subgroups that draw patches.
-const SUBGROUP_SIZES: RangeInclusive<u32> = 4..=64;
-
-/// The threads that draw a patch together on a device.
-pub fn lanes(device: &Device) -> Lanes {
-    let info = device.adapter_info();
-    let sizes = [info.subgroup_min_size, info.subgroup_max_size];
-    lanes_of(device.features(), sizes, info.device_type == DeviceType::Cpu)
-}
-
-/// The same for a device with some features, and subgroups of these least and most threads. Where a subgroup is a workgroup, barriers of workgroups serve as well. Some devices
-/// have no others, and GPUs need only make what a thread has written to workgroup memory visible to the others at these. A software driver, which keeps
-/// the order of reads and writes, takes 1.1 to 1.2 times as long with them.
-fn lanes_of(features: Features, sizes: [u32; 2], is_software: bool) -> Lanes {
-    let has_subgroups = features.contains(Features::SUBGROUP) && sizes.iter().all(|size| SUBGROUP_SIZES.contains(size));
-    let is_only = sizes[0] >= sizes[1].min(PATCH_THREADS);
-    match features.contains(Features::SUBGROUP_BARRIER) {
-        true if has_subgroups && (is_software || !is_only) => Lanes::Subgroup,
-        _ if has_subgroups && is_only => Lanes::OnlySubgroup,
-        _ => Lanes::Workgroup,
-    }
 }
 
 impl PlaneMode {
@@ -465,31 +437,5 @@ mod tests {
             assert_eq!(most_bytes_of(kind, 8192), 8192, "{kind:?}");
         }
         assert_eq!(most_bytes_of(DeviceType::Cpu, 32768), 32768);
-    }
-
-    /// Devices as they are: Vulkan on NVIDIA, AMD and Intel, DirectX 12 on these, where subgroups have no barriers, lavapipe, and devices without
-    /// subgroups or with others.
-    #[test]
-    fn every_device_has_lanes() {
-        let with_barriers = Features::SUBGROUP | Features::SUBGROUP_BARRIER;
-        let none = Features::empty();
-        for (features, sizes, is_software, expected) in [
-            (with_barriers, [32, 32], false, Lanes::OnlySubgroup),
-            (with_barriers, [32, 64], false, Lanes::OnlySubgroup),
-            (with_barriers, [64, 64], false, Lanes::OnlySubgroup),
-            (with_barriers, [8, 32], false, Lanes::Subgroup),
-            (with_barriers, [4, 64], false, Lanes::Subgroup),
-            (with_barriers, [8, 8], true, Lanes::Subgroup),
-            (with_barriers, [2, 32], false, Lanes::Workgroup),
-            (with_barriers, [32, 128], false, Lanes::Workgroup),
-            (Features::SUBGROUP, [8, 8], true, Lanes::OnlySubgroup),
-            (Features::SUBGROUP, [32, 64], false, Lanes::OnlySubgroup),
-            (Features::SUBGROUP, [8, 32], false, Lanes::Workgroup),
-            (Features::SUBGROUP_BARRIER, [32, 32], false, Lanes::Workgroup),
-            (none, [32, 32], false, Lanes::Workgroup),
-            (none, [4, 128], false, Lanes::Workgroup),
-        ] {
-            assert_eq!(lanes_of(features, sizes, is_software), expected, "{features:?}, {sizes:?}, {is_software}");
-        }
     }
 }

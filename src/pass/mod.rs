@@ -14,6 +14,7 @@ pub mod field_colors;
 pub mod first_hit;
 pub mod gather;
 pub mod join;
+pub(crate) mod lanes;
 pub mod occlude;
 pub mod resolve;
 pub mod sample;

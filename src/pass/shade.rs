@@ -8,7 +8,7 @@ use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages
 use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, Frame, Indirect, Splat};
 use crate::gpu::shaders;
-use crate::gpu::volume_texture::{OwnColors, VolumeTexture};
+use crate::gpu::volume_texture::{OwnColors, Pages, VolumeTexture, page_bits};
 
 /// The stage's pipelines. Each is compiled when it is first needed.
 #[derive(Debug)]
@@ -24,6 +24,7 @@ struct ShadeMode {
     /// Whether labels have their own ramps.
     labels: bool,
     holes: bool,
+    page_bits: u32,
     channels: u32,
     /// The number in the voxels' own colours that stands for 1; 0 if they have none.
     full_color: u32,
@@ -38,6 +39,8 @@ pub struct ShadeBuffers<'a> {
     pub bricks: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// The slots of pages, where voxels are in pages.
+    pub pages: Option<Pages<'a>>,
     /// Whether any value is a hole.
     pub has_holes: bool,
     /// The number of channels (SPEC §10).
@@ -84,10 +87,12 @@ impl Shade {
             ("splats", whole(splats)),
             ("labels", BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view))),
             ("colors", BindingResource::TextureView(buffers.colors.map_or(&self.no_colors.view, |own| own.view))),
+            ("pages", BindingResource::TextureView(buffers.pages.map_or(values, |pages| pages.view))),
         ];
         let mode = ShadeMode {
             labels: labels.is_some(),
             holes: buffers.has_holes,
+            page_bits: page_bits(buffers.pages),
             channels: buffers.channels,
             full_color: buffers.colors.map_or(0, |own| own.full),
         };
@@ -102,7 +107,7 @@ impl Shade {
     }
 }
 
-fn compile(device: &Device, ShadeMode { labels, holes, channels, full_color }: ShadeMode) -> ComputeStage {
+fn compile(device: &Device, ShadeMode { labels, holes, page_bits, channels, full_color }: ShadeMode) -> ComputeStage {
     let stage = ShaderStages::COMPUTE;
     let slots = [
         ("frames", uniform::<Frame>(stage, false)),
@@ -114,11 +119,13 @@ fn compile(device: &Device, ShadeMode { labels, holes, channels, full_color }: S
         ("splats", storage::<Splat>(stage, false)),
         ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("colors", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("pages", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
     let flag = |is_set| f64::from(u8::from(is_set));
     let constants = [
         ("LABELS", flag(labels)),
         ("HOLES", flag(holes)),
+        ("PAGE_BITS", f64::from(page_bits)),
         ("CHANNELS", f64::from(channels)),
         ("FULL_COLOR", f64::from(full_color)),
     ];

@@ -7,12 +7,13 @@ use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages
 use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, FieldPlanes, FieldVoxel, Frame, Indirect};
 use crate::gpu::shaders;
+use crate::gpu::volume_texture::{Pages, page_bits};
 
 /// The stage's pipelines, each compiled when it is first needed.
 #[derive(Debug, Default)]
 pub struct Values {
-    /// Indexed by whether coefficients differ from the values, and by whether there are holes.
-    stages: [[OnceLock<ComputeStage>; 2]; 2],
+    /// Indexed by whether coefficients differ from the values, by whether there are holes, and by the bits of a place in a page.
+    stages: [[[OnceLock<ComputeStage>; 5]; 2]; 2],
 }
 
 /// The buffers for drawing voxels onto planes.
@@ -33,6 +34,8 @@ pub struct ValuesBuffers<'a> {
     pub bricks: &'a Buffer,
     /// The volume's values.
     pub values: &'a TextureView,
+    /// The slots of pages, where voxels are in pages.
+    pub pages: Option<Pages<'a>>,
     /// Whether any value is a hole.
     pub has_holes: bool,
     /// The planes that voxels are drawn onto.
@@ -49,14 +52,13 @@ pub struct ValuesBuffers<'a> {
 #[derive(Debug)]
 pub struct ValuesGroup {
     group: BindGroup,
-    is_exact: bool,
-    has_holes: bool,
+    mode: [usize; 3],
 }
 
 impl Values {
     /// Binds buffers.
     pub fn bind(&self, device: &Device, buffers: ValuesBuffers<'_>) -> ValuesGroup {
-        let ValuesBuffers { frame, bricks, values, has_holes, planes, places, args, voxels } = buffers;
+        let ValuesBuffers { frame, bricks, values, pages, has_holes, planes, places, args, voxels } = buffers;
         let whole = Buffer::as_entire_binding;
         let resources = [
             ("frames", whole(frame)),
@@ -67,22 +69,25 @@ impl Values {
             ("args", whole(args)),
             ("voxels", whole(voxels)),
             ("planes", whole(planes.planes)),
+            ("pages", BindingResource::TextureView(pages.map_or(values, |pages| pages.view))),
         ];
         let is_exact = planes.coefficients.is_some();
-        let stage = &self.stages[usize::from(is_exact)][usize::from(has_holes)];
-        let stage = stage.get_or_init(|| compile(device, is_exact, has_holes));
-        ValuesGroup { group: stage.bind(device, &resources), is_exact, has_holes }
+        let mode = [is_exact.into(), has_holes.into(), page_bits(pages) as usize];
+        let [exact, holes, bits] = mode;
+        let stage = self.stages[exact][holes][bits].get_or_init(|| compile(device, mode));
+        ValuesGroup { group: stage.bind(device, &resources), mode }
     }
 
     /// Computes the listed voxels, whose number `args` holds.
     pub fn record(&self, pass: &mut ComputePass<'_>, bound: &ValuesGroup, args: &Buffer) {
-        if let Some(stage) = self.stages[usize::from(bound.is_exact)][usize::from(bound.has_holes)].get() {
+        let [exact, holes, bits] = bound.mode;
+        if let Some(stage) = self.stages[exact][holes][bits].get() {
             stage.dispatch_indirect(pass, &bound.group, &[], args);
         }
     }
 }
 
-fn compile(device: &Device, is_exact: bool, has_holes: bool) -> ComputeStage {
+fn compile(device: &Device, [exact, holes, bits]: [usize; 3]) -> ComputeStage {
     let stage = ShaderStages::COMPUTE;
     let slots = [
         ("frames", uniform::<Frame>(stage, false)),
@@ -93,7 +98,8 @@ fn compile(device: &Device, is_exact: bool, has_holes: bool) -> ComputeStage {
         ("args", storage::<Indirect>(stage, true)),
         ("voxels", storage::<FieldVoxel>(stage, false)),
         ("planes", uniform::<FieldPlanes>(stage, false)),
+        ("pages", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
-    let constants = [("EXACT", f64::from(u8::from(is_exact))), ("HOLES", f64::from(u8::from(has_holes)))];
+    let constants = [("EXACT", exact as f64), ("HOLES", holes as f64), ("PAGE_BITS", bits as f64)];
     ComputeStage::new(device, shaders::VALUES, "main", &slots, &constants)
 }

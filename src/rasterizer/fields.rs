@@ -18,6 +18,7 @@ use crate::gpu::ramps::Stored;
 use crate::gpu::targets::Targets;
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
+use crate::gpu::volume_texture::page_bits;
 use crate::lists::brick;
 use crate::lists::quad_plan::FramePlan;
 use crate::pass::classify::{Classify, ClassifyBuffers, ClassifyGroup, ClassifyMode};
@@ -185,9 +186,10 @@ impl FieldRasterizer {
                 let color_group = colors.map(|colors| {
                     let stage = self.colors.get_or_init(|| FieldColors::new(device, self.sheet_format));
                     let (groups, bricks) = (&groups.groups, &list.buffer);
-                    let mode = ColorMode { full: colors.full, is_exact: coefficients.is_some() };
-                    let colors = colors.view;
-                    stage.bind(device, mode, FieldColorsBuffers { frame, groups, planes, bricks, colors }, &cull)
+                    let (colors, full, pages) = (colors.view, colors.full, inputs.volume.pages());
+                    let mode = ColorMode { full, is_exact: coefficients.is_some(), page_bits: page_bits(pages) };
+                    let buffers = FieldColorsBuffers { frame, groups, planes, bricks, colors, pages };
+                    stage.bind(device, mode, buffers, &cull)
                 });
                 prepared.push(PreparedList { channel, cull, field_group, color_group });
             }
@@ -210,6 +212,7 @@ impl FieldRasterizer {
             control_points,
             planes: &channels[0].planes,
             values: volume.values(),
+            pages: volume.pages(),
             labels: inputs.labels(),
         };
         let mode = ClassifyMode {
@@ -217,6 +220,7 @@ impl FieldRasterizer {
             gradient: after.gradient,
             labels: volume.shades_by_label(&request.layer),
             holes: volume.has_holes(),
+            page_bits: page_bits(volume.pages()),
             channels: channels.len() as u32,
             own_colors: request.colored() > 0,
         };

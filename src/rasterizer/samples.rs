@@ -113,6 +113,7 @@ impl SampleRasterizer {
                 frame: inputs.frame,
                 bricks: inputs.list().lists.first().map_or(&buffers.splats, |list| &list.buffer),
                 values: volume.values(),
+                pages: volume.pages(),
                 has_holes: volume.has_holes(),
                 channels: request.ramps.channels,
                 colors: inputs.colors(),

@@ -138,6 +138,7 @@ impl SheetGroups {
             frame,
             groups: &self.groups,
             values: volume.values(),
+            pages: volume.pages(),
             has_holes: volume.has_holes(),
             channels: request.ramps.channels,
             colors,

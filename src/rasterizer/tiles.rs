@@ -114,7 +114,8 @@ impl TileRasterizer {
         let (coefficients, colors) = (inputs.coefficients()?, inputs.splatted_colors()?);
         let planes = plane_mode(request);
         let mode = GatherMode::of(splatting, planes, view.perspective.is_some(), of_volume, *rays, bins.workgroups)
-            .with_channels(request.ramps.channels, colors);
+            .with_channels(request.ramps.channels, colors)
+            .with_pages(volume.pages());
         let buffers = GatherBuffers {
             frame: inputs.frame,
             gather: &own.uniform,
@@ -124,6 +125,7 @@ impl TileRasterizer {
             bins: &own.bins,
             control_points: inputs.control_points,
             values: volume.values(),
+            pages: volume.pages(),
             colors,
             labels: inputs.labels(),
             gathered: &own.gathered,

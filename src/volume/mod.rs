@@ -171,6 +171,15 @@ impl PartialEq for Volume {
     }
 }
 
+/// What a channel of a volume without values has ([`Volume::hollow`]).
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct HollowChannel {
+    pub(crate) labels: bool,
+    pub(crate) colors: bool,
+    pub(crate) holes: bool,
+}
+
 impl Volume {
     /// Makes a volume from its values, x fastest. A NaN or infinite value is a hole (SPEC §3). `origin` names the volume in errors. Of values that have 8
     /// or 16 bits, [`Self::from_values`] makes one without a copy.
@@ -249,6 +258,21 @@ impl Volume {
             sampled: None,
             coefficients: KeptCoefficients::default(),
         }
+    }
+
+    /// A volume without values: its grid, and what `like` tells of its channels, whether they have labels, colours, and holes. Nothing that reads values may
+    /// be asked of it.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(crate) fn hollow(grid: Grid, like: &[HollowChannel]) -> Self {
+        let channel = |&HollowChannel { labels, colors, holes }: &HollowChannel| Self {
+            labels: labels.then(|| Arc::from([])),
+            colors: colors.then(|| Arc::from([])),
+            holes: holes.into(),
+            ..Self::piece(grid, Values::default())
+        };
+        let mut channels = like.iter().map(channel);
+        let first = channels.next().unwrap_or_else(|| Self::piece(grid, Values::default()));
+        Self { further: channels.map(Arc::new).collect(), ..first }
     }
 
     /// The same values with another spacing (world units between neighbouring voxels; of a coarser level, those of the finest).

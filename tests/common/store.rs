@@ -5,7 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use glam::UVec3;
-use sheetsplat::volume::{Store, StoreLevel, StreamedLevel, StreamedVolume, Texel, Volume, VolumeError};
+use sheetsplat::volume::{
+    Encoding, SampleType, Store, StoreFacts, StoreLevel, StreamedLevel, StreamedVolume, Texel, Volume, VolumeError,
+};
 
 /// A volume in memory as a store that notes what is read of it.
 #[derive(Debug)]
@@ -23,6 +25,8 @@ pub(crate) struct MemoryStore {
     /// The number of boxes that were read.
     pub(crate) reads: AtomicU64,
     pub(crate) decodes_whole_chunks: bool,
+    /// The type of its samples, if it states one.
+    pub(crate) sample_type: Option<SampleType>,
 }
 
 impl MemoryStore {
@@ -37,6 +41,7 @@ impl MemoryStore {
             identity: "memory",
             reads: AtomicU64::new(0),
             decodes_whole_chunks: false,
+            sample_type: None,
         }
     }
 
@@ -109,6 +114,13 @@ impl Store for MemoryStore {
     fn range(&self, _: usize) -> Option<[f32; 2]> {
         let ends = |[least, greatest]: [f32; 2], value: f32| [least.min(value), greatest.max(value)];
         self.is_range_known.then(|| self.volume.values().iter().fold([f32::INFINITY, f32::NEG_INFINITY], ends))
+    }
+
+    fn facts(&self) -> StoreFacts {
+        let encoding = |sample_type| Encoding { format: "test", sample_type, channels: 1, times: 1 };
+        let mut facts = StoreFacts::default();
+        facts.encoding = self.sample_type.map(encoding);
+        facts
     }
 
     fn identity(&self) -> String {

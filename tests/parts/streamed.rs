@@ -11,7 +11,9 @@ use sheetsplat::part::Part;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Region, Window};
 use sheetsplat::stats::StoreCounts;
-use sheetsplat::volume::{IndexedStore, Labels, Store, StoreIndex, StreamedLevel, StreamedVolume, Volume, builtin};
+use sheetsplat::volume::{
+    IndexedStore, Labels, SampleType, Store, StoreIndex, StreamedLevel, StreamedVolume, Volume, builtin,
+};
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
@@ -108,6 +110,25 @@ fn boxes_by_the_gpu_are_the_volume_in_memory() {
     for sets in [&[0, 1, 3, 6][..], &[8, 9, 10, 11, 12, 13]].concat().into_iter().map(|at: usize| SCENES[at]) {
         assert_same(Backend::Gpu, 64, sets);
     }
+    assert_same(Backend::Gpu, 64, &["splatting.rasterizer=quads", "splatting.classification=after"]);
+}
+
+/// A GPU keeps the pages that further windows need. Where it has room for all, each chunk is read once, and of others the voxels beside drawn ones.
+#[test]
+fn pages_are_kept() {
+    let (volume, scene) = head(64, &["splatting.slab_width=2", "splatting.opacity_threshold=0.95"]);
+    let headless = headless(Backend::Gpu);
+    let draw = |memory: u64| {
+        let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(16)));
+        let drawn = headless.render_volume(store::streamed(store.clone(), 0, &volume, memory), &scene).unwrap();
+        (drawn.image, drawn.stats.store.unwrap(), store.reads.load(Ordering::Relaxed))
+    };
+    let (image, counts, reads) = draw(8 << 20);
+    assert!(reads < 3 * counts.chunks_read, "{reads} {counts:?}");
+    // With few slots pages go and come back.
+    let (few, counts, again) = draw(1 << 19);
+    assert!(again > 2 * reads, "{again} {reads} {counts:?}");
+    assert_at_least(psnr(&few.pixels, &image.pixels, [0.2, 0.4, 0.6, 0.5], 500), 40.0, "few slots");
 }
 
 /// Where a part of a chunk takes as long to read as all of it, chunks are read once as long as they fit into memory.
@@ -132,6 +153,45 @@ fn decoded_chunks_are_kept() {
     let (few, counts, reads) = draw(3 << 18, true, UVec3::new(8, 12, 10));
     assert!(reads > counts.chunks_read, "{reads} {counts:?}");
     assert_at_least(psnr(&few.pixels, &image.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, "in less memory");
+}
+
+/// What becomes of a voxel, given by its index, and its value.
+type Change<'a> = &'a dyn Fn(usize, f32) -> f32;
+
+/// Pages hold values in as few bits as samples have, and in more once a value turns out not to be one of them: none of the first values, a fraction in the middle, or a
+/// hole at the end.
+#[test]
+fn pages_hold_what_values_are() {
+    let (head, scene) = head(64, &["splatting.classification=after"]);
+    let fraction = |at: usize, value: f32| if at == 150_000 { value + 0.25 } else { value };
+    let hole = |at: usize, value: f32| if at == 250_000 { f32::NAN } else { value };
+    let kinds: [(SampleType, Change<'_>); 7] = [
+        (SampleType::U8, &|_, value| value),
+        (SampleType::I8, &|_, value| (value / 2.0).floor() - 60.0),
+        (SampleType::U16, &|_, value| value * 200.0),
+        (SampleType::I16, &|_, value| value * 100.0 - 9000.0),
+        (SampleType::U8, &|_, value| value * 3.0),
+        (SampleType::U8, &fraction),
+        (SampleType::I16, &hole),
+    ];
+    let mut memory = Vec::new();
+    for (sample_type, value) in kinds {
+        let values = head.values().iter().enumerate().map(|(at, own)| value(at, own)).collect();
+        let volume = Volume::new("head", head.dims(), head.spacing(), values).unwrap();
+        let [low, high] = [value(0, 40.0), value(0, 160.0)];
+        let sets = [format!(
+            "transfer={{color=[[{low},[0.3,0.5,0.9]],[{high},[1,0.8,0.4]]],opacity=[[{low},0],[{high},0.5]]}}"
+        )];
+        let scene = Scene { transfer: super::streamed::head(64, &[&sets[0]]).1.transfer, ..scene.clone() };
+        let headless = headless(Backend::Gpu);
+        let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
+        let store = MemoryStore { sample_type: Some(sample_type), ..MemoryStore::new(&volume, UVec3::splat(16)) };
+        let drawn = headless.render_volume(streamed(&volume, store, 1 << 20), &scene).unwrap();
+        let name = format!("{sample_type} from {low} to {high}");
+        assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, &name);
+        memory.push(drawn.stats.store.unwrap().chunk_bytes);
+    }
+    assert!(memory.iter().all(|&bytes| bytes <= 1 << 18), "{memory:?}");
 }
 
 /// Behind the opaque middle of a wall nothing of the haze is drawn, although the box of the open pixels around it contains it.
@@ -189,6 +249,13 @@ fn boxes_that_show_nothing_are_not_read() {
     let near = ["camera.height=9", "splatting.opacity_threshold=0.95", opaque];
     let hidden = assert_same_with(Backend::Reference, 64, &near, 1 << 18);
     let all = assert_same_with(Backend::Reference, 64, &[near[0], "splatting.culling=false", opaque], 1 << 18);
+    assert!(hidden.chunks_read * 3 < all.chunks_read * 2, "{hidden:?} {all:?}");
+    let (volume, mut scene) = head(128, &near);
+    let [hidden, all] = [true, false].map(|culling| {
+        scene.splatting.culling = culling;
+        let store = MemoryStore::new(&volume, UVec3::new(8, 12, 10));
+        headless(Backend::Gpu).render_volume(streamed(&volume, store, 1 << 20), &scene).unwrap().stats.store.unwrap()
+    });
     assert!(hidden.chunks_read * 3 < all.chunks_read * 2, "{hidden:?} {all:?}");
 
     // A bright block in a corner of a volume that the store holds everywhere.

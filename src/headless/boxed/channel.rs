@@ -1,7 +1,7 @@
 //! The chunks of one channel of a volume that is streamed: of its values and of its labels.
 
 use std::collections::{BTreeMap, HashSet};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::{DVec3, UVec3};
 
@@ -79,6 +79,12 @@ impl<'a> ChannelChunks<'a> {
         !self.opaque.ranges().is_empty()
     }
 
+    /// Whether values count that have no opacity.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(super) fn counts_all(&self) -> bool {
+        self.counts_all
+    }
+
     /// What is read of the channel.
     pub(super) fn levels(&self) -> impl Iterator<Item = &LevelChunks<'a>> {
         std::iter::once(&self.values).chain(&self.labels)
@@ -91,34 +97,57 @@ impl<'a> ChannelChunks<'a> {
         (size_of::<f32>() + colors + labels) as u64
     }
 
-    /// Reads a box of the channel, whose voxels lie on a grid; `None` if nothing of it can be seen.
+    /// Reads a box of the channel, whose voxels lie on a grid; `None` if nothing can be seen of the box, or of one in it.
     ///
     /// # Errors
     /// If a store cannot be read, or holds a value that is no label.
-    pub(super) fn read(&mut self, within: VoxelBox, grid: &Grid) -> Result<Option<Volume>, RenderError> {
-        if !self.is_visible(within)? {
+    pub(super) fn read(
+        &self,
+        (within, seen): (VoxelBox, VoxelBox),
+        grid: &Grid,
+    ) -> Result<Option<Volume>, RenderError> {
+        if !self.is_visible(seen)? {
             return Ok(None);
         }
-        let Voxels { values, colors, range } = self.values.read(within)?;
-        if !self.counts_all && !self.has_opaque(range) {
+        let voxels = self.values.read(within)?;
+        if !self.counts_all && !self.has_opaque(voxels.range) {
             return Ok(None);
         }
+        self.with_labels(voxels, within, grid).map(Some)
+    }
+
+    /// Reads a box of the channel, whose voxels lie on a grid, seen or not.
+    ///
+    /// # Errors
+    /// If a store cannot be read, or holds a value that is no label.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(super) fn read_all(&self, within: VoxelBox, grid: &Grid) -> Result<Volume, RenderError> {
+        self.with_labels(self.values.read(within)?, within, grid)
+    }
+
+    /// A volume of the voxels of a box, with their labels, which are read.
+    fn with_labels(
+        &self,
+        Voxels { values, colors, .. }: Voxels,
+        within: VoxelBox,
+        grid: &Grid,
+    ) -> Result<Volume, RenderError> {
         let volume = Volume::punched(*grid, values);
         let volume = if self.values.of.store.has_colors() { volume.with_texels(colors) } else { volume };
-        let Some(labels) = &mut self.labels else { return Ok(Some(volume)) };
+        let Some(labels) = &self.labels else { return Ok(volume) };
         let origin = labels.of.origin.clone();
         let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read(within)?.values)?;
         let labels = Labels { origin, dims: grid.dims, spacing: None, values, names: BTreeMap::new() };
-        Ok(Some(volume.with_labels(labels)?))
+        Ok(volume.with_labels(labels)?)
     }
 
     /// The labels of some voxels, 0 without any, which are read in blocks.
     ///
     /// # Errors
     /// If a store cannot be read, or holds a value that is no label.
-    pub(super) fn labels_at(&mut self, voxels: &[UVec3]) -> Result<Vec<u16>, RenderError> {
+    pub(super) fn labels_at(&self, voxels: &[UVec3]) -> Result<Vec<u16>, RenderError> {
         let mut found = vec![0; voxels.len()];
-        let Some(labels) = &mut self.labels else { return Ok(found) };
+        let Some(labels) = &self.labels else { return Ok(found) };
         let side = labels.level.chunk.min(UVec3::splat(BLOCK));
         let mut blocks = BTreeMap::<[u32; 3], Vec<usize>>::new();
         for (at, voxel) in voxels.iter().enumerate() {
@@ -189,10 +218,16 @@ pub(in crate::headless) fn opaque_values(transfer: &TransferFunction) -> ValueSe
 pub(super) struct LevelChunks<'a> {
     of: &'a StreamedLevel,
     level: StoreLevel,
-    read: HashSet<UVec3>,
-    bytes_read: u64,
+    tally: Mutex<Tally>,
     /// Chunks, if the store decodes them as a whole, and there is room for as many as are read at once.
     kept: Option<Kept>,
+}
+
+/// The chunks of which something was read, and their bytes in the store, each chunk's once.
+#[derive(Debug, Default)]
+struct Tally {
+    chunks: HashSet<UVec3>,
+    bytes: u64,
 }
 
 /// The values of some voxels, their range, and the voxels' colours if they have any.
@@ -232,17 +267,27 @@ impl<'a> LevelChunks<'a> {
         let values = level.chunk.min(level.grid.dims).as_u64vec3().element_product();
         let at_once = values.saturating_mul(size_of::<f32>() as u64).saturating_mul(current_num_threads() as u64);
         let is_kept = of.store.decodes_whole_chunks() && !of.store.has_colors() && at_once <= kept;
-        Ok(Self { of, level, read: HashSet::new(), bytes_read: 0, kept: is_kept.then(|| Kept::new(kept)) })
+        Ok(Self { of, level, tally: Mutex::default(), kept: is_kept.then(|| Kept::new(kept)) })
     }
 
     /// The number of chunks of which something was read.
     pub(super) fn chunks_read(&self) -> u64 {
-        self.read.len() as u64
+        self.tally().chunks.len() as u64
     }
 
     /// Their bytes in the store, each chunk's once.
     pub(super) fn bytes_read(&self) -> u64 {
-        self.bytes_read
+        self.tally().bytes
+    }
+
+    fn tally(&self) -> MutexGuard<'_, Tally> {
+        self.tally.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The voxels along each axis of a chunk.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(super) fn chunk(&self) -> UVec3 {
+        self.level.chunk
     }
 
     /// The most bytes that decoded chunks took at a time.
@@ -256,7 +301,7 @@ impl<'a> LevelChunks<'a> {
     }
 
     /// Reads the voxels of a box.
-    fn read(&mut self, within: VoxelBox) -> Result<Voxels, VolumeError> {
+    fn read(&self, within: VoxelBox) -> Result<Voxels, VolumeError> {
         let VoxelBox { low, end } = within;
         let chunks: Vec<UVec3> = self.chunks(within).collect();
         let grid = self.level.grid.part(low, end - low);
@@ -268,8 +313,9 @@ impl<'a> LevelChunks<'a> {
             let first = |row: u32| grid.index_of(from - low + UVec3::new(0, row % dims.y, row / dims.y)) as usize;
             put(&voxels.values, dims.x, &mut all.values, first);
             put(&voxels.colors, dims.x, &mut all.colors, first);
-            if let Some(bytes) = bytes.filter(|_| self.read.insert(chunk)) {
-                self.bytes_read += bytes;
+            let mut tally = self.tally();
+            if let Some(bytes) = bytes.filter(|_| tally.chunks.insert(chunk)) {
+                tally.bytes += bytes;
             }
         }
         Ok(all)

@@ -14,6 +14,8 @@ use crate::scene::Scene;
 use crate::settings::splatting::Classification;
 use crate::settings::window::Region;
 use crate::stats::StoreCounts;
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+use crate::volume::Grid;
 use crate::volume::{StreamedVolume, Volume};
 
 /// The part of the memory that the values of a box may take, as backends hold them several times, and that decoded chunks may take.
@@ -23,13 +25,13 @@ const SHARE: u64 = 4;
 const STEP_SHARE: u64 = 8;
 
 /// Slabs around those of a window, which share planes with them.
-const SLABS: f64 = 2.0;
+pub(super) const SLABS: f64 = 2.0;
 
 /// Voxels around those whose kernels reach a window: for differences between neighbours, and rounding.
 const RIM: f64 = 3.0;
 
 /// Pixels around those of a window.
-const PIXELS: f64 = 1.0;
+pub(super) const PIXELS: f64 = 1.0;
 
 /// What is read of a volume for a view.
 pub(super) struct Chunks<'a> {
@@ -42,8 +44,8 @@ pub(super) struct Chunks<'a> {
     most_held: u64,
 }
 
-/// Some slabs, and the box of voxels that they need; `None` if they need none.
-pub(super) type Step = (Range<i32>, Option<VoxelBox>);
+/// Some slabs, and what they need of the voxels, such as a box of them; `None` if they need none.
+pub(super) type Step<Needed = VoxelBox> = (Range<i32>, Option<Needed>);
 
 /// A box of voxels in memory, and the numbers of the volume's channels that it has.
 pub(super) type Filled = (Volume, Vec<usize>);
@@ -97,7 +99,7 @@ impl<'a> Chunks<'a> {
     }
 
     /// The smallest box with all voxels that can change a pixel of a region in some slabs; `None` if no voxel can.
-    fn needed(&self, region: &Region, slabs: &Range<i32>) -> Option<VoxelBox> {
+    pub(super) fn needed(&self, region: &Region, slabs: &Range<i32>) -> Option<VoxelBox> {
         let view = &self.view;
         let first = DVec2::new(f64::from(region.x), f64::from(region.y)) - PIXELS;
         let last = first + DVec2::new(f64::from(region.width), f64::from(region.height)) + 2.0 * PIXELS;
@@ -122,10 +124,22 @@ impl<'a> Chunks<'a> {
     /// # Errors
     /// If a store cannot be read, or holds a value that is no label.
     pub(super) fn read(&mut self, within: VoxelBox) -> Result<Option<Filled>, RenderError> {
+        let filled = self.read_seen(within, within)?;
+        if filled.is_some() {
+            self.most_held = self.most_held.max(within.voxels().saturating_mul(self.voxel_bytes()));
+        }
+        Ok(filled)
+    }
+
+    /// As [`Self::read`], in every channel that may show something in a box within.
+    ///
+    /// # Errors
+    /// As for [`Self::read`].
+    pub(super) fn read_seen(&self, within: VoxelBox, seen: VoxelBox) -> Result<Option<Filled>, RenderError> {
         let grid = self.volume.grid().part(within.low, within.end - within.low);
         let (mut filled, mut numbers) = (Vec::new(), Vec::new());
-        for channel in &mut self.channels {
-            if let Some(volume) = channel.read(within, &grid)? {
+        for channel in &self.channels {
+            if let Some(volume) = channel.read((within, seen), &grid)? {
                 filled.push(volume);
                 numbers.push(channel.number);
             }
@@ -133,7 +147,6 @@ impl<'a> Chunks<'a> {
         if filled.is_empty() {
             return Ok(None);
         }
-        self.most_held = self.most_held.max(within.voxels().saturating_mul(self.voxel_bytes()));
         let first = filled.remove(0);
         Ok(Some((first.with_channels(&self.volume.first.values.origin, filled)?, numbers)))
     }
@@ -142,15 +155,10 @@ impl<'a> Chunks<'a> {
     ///
     /// # Errors
     /// If a store cannot be read, or holds a value that is no label.
-    pub(super) fn note_labels(
-        &mut self,
-        scene: &Scene,
-        region: &Region,
-        content: &mut Content,
-    ) -> Result<(), RenderError> {
+    pub(super) fn note_labels(&self, scene: &Scene, region: &Region, content: &mut Content) -> Result<(), RenderError> {
         let Self { view, volume, channels, .. } = self;
         part::note_labels((view, scene, volume.grid()), region, content, |voxels| {
-            channels.first_mut().map_or_else(|| Ok(Vec::new()), |channel| channel.labels_at(voxels))
+            channels.first().map_or_else(|| Ok(Vec::new()), |channel| channel.labels_at(voxels))
         })
     }
 
@@ -174,12 +182,30 @@ impl<'a> Chunks<'a> {
         }
     }
 
+    /// The channels that have an opacity.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(super) fn channels(&self) -> impl Iterator<Item = &ChannelChunks<'a>> {
+        self.channels.iter()
+    }
+
+    /// What a view of the volume is, its grid, and the voxels around a point on a pixel's ray whose kernels reach it.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(super) fn geometry(&self) -> (&ViewGeometry, &Grid, DVec3) {
+        (&self.view, self.volume.grid(), self.half_box)
+    }
+
+    /// Whether values without an opacity change pixels.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(super) fn counts_all(&self) -> bool {
+        self.channels.iter().any(ChannelChunks::counts_all)
+    }
+
     /// The bytes of a voxel's values and labels.
-    fn voxel_bytes(&self) -> u64 {
+    pub(super) fn voxel_bytes(&self) -> u64 {
         self.channels.iter().map(ChannelChunks::voxel_bytes).sum()
     }
 
-    fn budget(&self) -> u64 {
+    pub(super) fn budget(&self) -> u64 {
         self.volume.memory / SHARE
     }
 }

@@ -4,6 +4,13 @@
 mod channel;
 mod chunks;
 mod kept;
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+mod needed_pages;
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+mod open_pixels;
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+mod pages;
+mod source;
 
 use std::ops::Range;
 
@@ -24,16 +31,7 @@ use crate::stats::{Counts, Stats};
 use crate::volume::range::range_of;
 use crate::volume::{StreamedVolume, check_grids};
 pub(super) use channel::opaque_values;
-use chunks::{Chunks, Filled, Step};
-
-/// The side in pixels of the regions that an image is divided into. A region whose voxels do not fit into memory is divided further.
-const SIDE: u32 = 256;
-
-/// The minimum side of a region.
-const LEAST_SIDE: u32 = 8;
-
-/// The part of a region's time that its quarters must take less than, so that they are drawn instead.
-const DIVIDED: f64 = 0.8;
+use source::{Needed, Source};
 
 /// A view of a volume that is read while it is drawn.
 #[derive(Clone, Debug)]
@@ -106,18 +104,18 @@ impl BoxedView {
         let mut walk = Walk {
             identity: Identity::of((&volume.clone().into(), &scene), &view)?,
             slabs: window.within(&view.slabs_of(volume.grid())),
-            chunks: Chunks::new(volume, &scene, &view)?,
+            source: Source::new(headless, volume, &scene, &view)?,
             scene,
             headless,
             range: volume.first.values.range().or_else(|| range_of(volume.sample.values().iter())).unwrap_or([0.0; 2]),
             parts: Vec::new(),
             stats: Stats::default(),
         };
-        for region in tiles(&window.region, SIDE) {
+        for region in tiles(&window.region, walk.source.side()) {
             walk.region(region)?;
         }
-        let Walk { chunks, parts, stats, .. } = walk;
-        let store = volume.with_sample(chunks.counts());
+        let Walk { source, parts, stats, .. } = walk;
+        let store = volume.with_sample(source.counts());
         let counts = Counts { voxels_total: volume.grid().voxels(), ..stats.counts };
         let [width, height] = view.size;
         // Nothing may have been drawn.
@@ -132,7 +130,7 @@ struct Walk<'a> {
     identity: Identity,
     /// The slabs that are drawn.
     slabs: Range<i32>,
-    chunks: Chunks<'a>,
+    source: Source<'a>,
     /// What draws the boxes.
     headless: &'a Headless,
     /// The minimum and maximum of the first channel's values, or of its sample's; there is no other channel where pixels choose values.
@@ -148,7 +146,7 @@ impl Walk<'_> {
         // What opaque pixels hide counts as drawn.
         let (slabs, mut content) = (self.slabs.clone(), self.behind(region, self.slabs.clone(), nothing)?);
         if self.identity.notes_labels() {
-            self.chunks.note_labels(&self.scene, &region, &mut content)?;
+            self.source.chunks().note_labels(&self.scene, &region, &mut content)?;
         }
         self.parts.push(Part::named(self.identity.clone(), Window { slabs, region }, vec![content]));
         Ok(())
@@ -160,10 +158,11 @@ impl Walk<'_> {
         while slabs.start < slabs.end {
             let Some(open) = self.open_box(&drawn, &region) else { break };
             let longer = open.width.max(open.height);
-            let quarters = tiles(&open, longer.div_ceil(2).max(LEAST_SIDE));
-            let Some((step, needed)) = self.step(&open, &quarters, &slabs) else {
-                if longer <= LEAST_SIDE {
-                    return Err(self.chunks.too_large().into());
+            let quarters = tiles(&open, longer.div_ceil(2).max(self.source.least_side()));
+            let is_open = self.open_pixels(&cut_out(&drawn, &region, &open));
+            let Some((step, needed)) = self.source.step((&open, &quarters), is_open.as_deref(), &slabs)? else {
+                if longer <= self.source.least_side() {
+                    return Err(self.source.chunks().too_large().into());
                 }
                 for quarter in quarters {
                     let behind = self.behind(quarter, slabs.clone(), cut_out(&drawn, &region, &quarter))?;
@@ -171,61 +170,58 @@ impl Walk<'_> {
                 }
                 break;
             };
-            let filled = needed.map_or(Ok(None), |needed| self.chunks.read(needed))?;
             slabs.start = step.end;
-            if let Some(filled) = filled {
+            if let Some(needed) = needed {
                 let front = cut_out(&drawn, &region, &open);
                 let window = Window { slabs: step, region: open };
-                let joined = self.join(front, filled, window)?;
-                put((&joined, &open), (&mut drawn, &region));
+                if let Some(joined) = self.join(front, needed, window)? {
+                    put((&joined, &open), (&mut drawn, &region));
+                }
             }
         }
         Ok(drawn)
     }
 
-    /// The first step in which slabs behind a region are drawn; `None` if its quarters are to be drawn instead.
-    fn step(&self, region: &Region, quarters: &[Region], slabs: &Range<i32>) -> Option<Step> {
-        let whole = self.chunks.deepest(region, slabs.clone());
-        let time = |step: &Option<Step>| self.chunks.voxels_per_slab(step.as_ref());
-        let of_quarters = quarters.iter().map(|quarter| time(&self.chunks.deepest(quarter, slabs.clone())));
-        // A flat box around what an oblique region sees is mostly empty of it.
-        let is_divided = quarters.len() > 1 && of_quarters.sum::<f64>() < DIVIDED * time(&whole);
-        whole.filter(|_| !is_divided)
-    }
-
-    /// Draws a window from the voxels that it needs, behind what its region shows already.
-    fn join(&mut self, front: Content, filled: Filled, window: Window) -> Result<Content, RenderError> {
-        let closed: Option<Vec<bool>> = opaque_from(&self.scene.splatting)
-            .map(|opaque| front.colors.iter().map(|color| color[3] >= opaque).collect());
+    /// Draws a window from the voxels that it needs, behind what its region shows already; `None` if nothing of them can be seen.
+    fn join(&mut self, front: Content, needed: Needed, window: Window) -> Result<Option<Content>, RenderError> {
+        let closed = self.open_pixels(&front).map(|open| open.iter().map(|is_open| !is_open).collect::<Vec<_>>());
         let closed = closed.filter(|closed| closed.contains(&true));
-        let content = self.draw(filled, &window, closed.as_deref())?;
+        let Some(content) = self.draw(needed, &window, closed.as_deref())? else { return Ok(None) };
         let part =
             |slabs, content| Part::named(self.identity.clone(), Window { slabs, ..window.clone() }, vec![content]);
         let start = window.slabs.start;
         let joined = Part::join([part(start - 1..start, front), part(window.slabs.clone(), content)]);
-        Ok(joined.map_err(unmerged)?.content)
+        Ok(Some(joined.map_err(unmerged)?.content))
     }
 
-    /// Draws a window from the voxels that it needs. A channel of which nothing is seen changes nothing, so that its table is left out.
+    /// Draws a window from the voxels that it needs.
     fn draw(
         &mut self,
-        (volume, channels): Filled,
+        needed: Needed,
         window: &Window,
         closed: Option<&[bool]>,
-    ) -> Result<Content, RenderError> {
+    ) -> Result<Option<Content>, RenderError> {
+        let Some((mut content, stats, range)) =
+            self.source.draw(self.headless, needed, (&self.scene, window), closed)?
+        else {
+            return Ok(None);
+        };
         // Means are noted as they are.
         let is_choice = self.identity.has_extremes() && self.scene.splatting.compositing != Compositing::Average;
-        let range = if is_choice { range_of(volume.values().iter()) } else { None };
-        let scene = self.scene.of_channels(&channels);
-        let (mut content, stats) = self.headless.draw_box(volume, &scene, window, closed)?;
-        if let Some(range) = range {
+        if let Some(range) = range.filter(|_| is_choice) {
             in_range(&mut content.extremes, range, self.range);
         }
         let (counts, prepare_ms) = (self.stats.counts, self.stats.prepare_ms);
         self.stats = Stats { prepare_ms: prepare_ms + stats.prepare_ms, ..stats };
         let own = std::mem::replace(&mut self.stats.counts, counts);
         self.stats.counts.add_channel(&own);
-        Ok(content)
+        Ok(Some(content))
+    }
+
+    /// For each pixel whether anything can be seen behind it; `None` if nothing hides what lies behind it.
+    fn open_pixels(&self, content: &Content) -> Option<Vec<bool>> {
+        let opaque = opaque_from(&self.scene.splatting)?;
+        Some(content.colors.iter().map(|color| color[3] < opaque).collect())
     }
 
     /// The smallest box of a region's pixels behind which anything can be seen; `None` if there is no such pixel.

@@ -90,6 +90,7 @@ fn classified(prepared: &Prepared<'_>, twin: &Frame<'_>, rays: Rays<'_>) -> (Vec
         control_points: &prepared.control_points,
         planes: &prepared.planes,
         values: &prepared.values.view,
+        pages: None,
         labels: labels.as_ref().map(|texture| &texture.view),
     };
     let mode = ClassifyMode {
@@ -97,6 +98,7 @@ fn classified(prepared: &Prepared<'_>, twin: &Frame<'_>, rays: Rays<'_>) -> (Vec
         gradient: scene.shading.gradient,
         labels: labels.is_some(),
         holes: prepared.has_holes(),
+        page_bits: 0,
         channels: 1,
         own_colors: false,
     };

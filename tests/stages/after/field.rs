@@ -74,6 +74,7 @@ fn any_list(prepared: &Prepared<'_>) -> CullList {
         frame: &uniform,
         groups: &uniform,
         values: &VolumeTexture::upload(device, prepared.gpu.queue(), ValueSlice::F32(&[0.0])).unwrap().view,
+        pages: None,
         has_holes: false,
         channels: 1,
         colors: None,

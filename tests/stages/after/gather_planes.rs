@@ -112,6 +112,7 @@ fn gathered(prepared: &Prepared<'_>, stage: &Gather, first_hit: Option<f64>, ban
         bins: &storage(&bins.words),
         control_points: &prepared.control_points,
         values: &prepared.values.view,
+        pages: None,
         colors: None,
         labels: labels.as_ref().map(|texture| &texture.view),
         gathered: &gathered,

@@ -2,10 +2,11 @@
 
 use glam::DVec2;
 use sheetsplat::internals::gpu::layout::{FieldVoxel, Indirect};
-use sheetsplat::internals::gpu::volume_texture::VolumeTexture;
+use sheetsplat::internals::gpu::volume_texture::{Pages, VolumeTexture};
 use sheetsplat::internals::pass::values::{PlaneBuffers, Values, ValuesBuffers};
 use sheetsplat::internals::reference::after::Frame;
-use sheetsplat::wgpu::BufferUsages;
+use sheetsplat::volume::ValueSlice;
+use sheetsplat::wgpu::{BufferUsages, TextureView};
 
 use super::{Prepared, each_case, gradient_of};
 use crate::common::compare::assert_at_most;
@@ -18,6 +19,15 @@ const UNTOUCHED: u32 = 0x7f7f_7f7f;
 
 /// The records of some voxels, and [`UNTOUCHED`] for all others.
 pub(super) fn records(prepared: &Prepared<'_>, places: &[u32]) -> Vec<FieldVoxel> {
+    records_of(prepared, (&prepared.values.view, None), places)
+}
+
+/// As [`records`], for values that may lie in pages.
+fn records_of(
+    prepared: &Prepared<'_>,
+    (values, pages): (&TextureView, Option<Pages<'_>>),
+    places: &[u32],
+) -> Vec<FieldVoxel> {
     let (gpu, device) = (prepared.gpu, prepared.gpu.device());
     let stage = Values::default();
     let coefficients =
@@ -35,7 +45,8 @@ pub(super) fn records(prepared: &Prepared<'_>, places: &[u32]) -> Vec<FieldVoxel
         ValuesBuffers {
             frame: &prepared.frame,
             bricks: &init(device, &prepared.bricks, BufferUsages::STORAGE),
-            values: &prepared.values.view,
+            values,
+            pages,
             has_holes: prepared.has_holes(),
             planes: PlaneBuffers { planes: &prepared.planes, coefficients },
             places: &init(device, &listed, BufferUsages::STORAGE),
@@ -45,6 +56,31 @@ pub(super) fn records(prepared: &Prepared<'_>, places: &[u32]) -> Vec<FieldVoxel
     );
     compute(gpu, |pass| stage.record(pass, &group, &dispatch));
     contents(gpu, &voxels)
+}
+
+/// The bits of a voxel's place in a page along each axis.
+const PAGE_BITS: u32 = 3;
+
+/// The values of a volume page by page, and the slots of all pages: the pages lie in no order, with others between them.
+fn in_pages(prepared: &Prepared<'_>) -> [VolumeTexture; 2] {
+    let (device, queue, grid) = (prepared.gpu.device(), prepared.gpu.queue(), prepared.volume.grid());
+    let (side, voxels) = (1 << PAGE_BITS, 1_usize << (3 * PAGE_BITS));
+    let across = grid.dims.map(|n| n.div_ceil(side));
+    let count = across.element_product();
+    // Odd factors have no common divisor with a power of two.
+    let slots = (2 * count).next_power_of_two();
+    let slot_of = |page: u32| page.wrapping_mul(29).wrapping_add(5) % slots;
+    // Elsewhere there is a value that is somewhere else in the volume.
+    let mut values = vec![prepared.volume.values().at(0); slots as usize * voxels];
+    for (index, value) in (0..).zip(prepared.volume.values().iter()) {
+        let (page, at) = (grid.voxel_at(index) / side, grid.voxel_at(index) % side);
+        let slot = slot_of(page.x + across.x * (page.y + across.y * page.z)) as usize;
+        values[slot * voxels + (at.x + side * (at.y + side * at.z)) as usize] = value;
+    }
+    let slots: Vec<f32> = (0..count).map(|page| f32::from_bits(slot_of(page))).collect();
+    let values = VolumeTexture::upload(device, queue, ValueSlice::F32(&values)).unwrap();
+    assert_eq!(values.format, prepared.values.format);
+    [values, VolumeTexture::upload_bits(device, queue, &slots).unwrap()]
 }
 
 /// The coefficients as numbers.
@@ -58,6 +94,10 @@ fn check(prepared: &Prepared<'_>, _: &Frame<'_>) {
     // Every other voxel.
     let places: Vec<u32> = voxels.keys().copied().step_by(2).collect();
     let records = records(prepared, &places);
+    let [values, slots] = in_pages(prepared);
+    let pages = Pages { view: &slots.view, bits: PAGE_BITS };
+    let of_pages = records_of(prepared, (&values.view, Some(pages)), &places);
+    assert!(prepared.is_exact() || of_pages == records, "{}: in pages", prepared.name);
     let spread = f64::from(numbers.range[1] - numbers.range[0]);
     let mut longest = 0.0_f64;
     for (place, record) in (0..).zip(&records) {

@@ -111,6 +111,7 @@ impl<'a> Culling<'a> {
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             groups: &groups,
             values: &uploaded.view,
+            pages: None,
             has_holes: values.iter().any(|value| value.is_nan()),
             channels: 1,
             colors: None,

@@ -127,6 +127,7 @@ impl<'a> Fixture<'a> {
             bins: &storage(&bins.words),
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             values: &values.view,
+            pages: None,
             colors: None,
             labels: None,
             gathered: &gathered,

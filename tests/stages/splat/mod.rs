@@ -49,6 +49,7 @@ impl<'a> Stages<'a> {
             frame: &uniform,
             groups: &uniform,
             values: &VolumeTexture::upload(device, gpu.queue(), ValueSlice::F32(&[0.0])).unwrap().view,
+            pages: None,
             has_holes: false,
             channels: 1,
             colors: None,
