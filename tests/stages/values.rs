@@ -21,7 +21,8 @@ const READ: &str = concat!(
     include_str!("../../shaders/shared/volume.wgsl"),
     "
     @group(0) @binding(1) var values: texture_2d_array<u32>;
-    @group(0) @binding(2) var<storage, read_write> result: array<u32>;
+    @group(0) @binding(2) var pages: texture_2d_array<u32>;
+    @group(0) @binding(3) var<storage, read_write> result: array<u32>;
     @compute @workgroup_size(64)
     fn main(@builtin(global_invocation_id) id: vec3u, @builtin(workgroup_id) workgroup: vec3u) {
         start(workgroup.z);
@@ -51,7 +52,9 @@ fn seen_by(gpu: &GpuHeadless, source: &str, values: ValueSlice<'_>, side: u32) -
     let device = gpu.device();
     let uploaded = VolumeTexture::upload_folded(device, gpu.queue(), values, side);
     let frame = init(device, &[frame(uploaded.format)], BufferUsages::UNIFORM);
-    let given = [frame.as_entire_binding(), BindingResource::TextureView(&uploaded.view)];
+    // Voxels are not in pages, so that any texture stands for theirs.
+    let texture = || BindingResource::TextureView(&uploaded.view);
+    let given = [frame.as_entire_binding(), texture(), texture()];
     written(gpu, source, &given, values.len() as u64)
 }
 
