@@ -20,11 +20,8 @@ fn folded(index: u32, side: u32) -> vec3u {
     return vec3u(index & (side - 1u), row & (side - 1u), row >> firstTrailingBit(side));
 }
 
-// The index of a voxel in the volume: x fastest, in the volume or in its page.
+// The index of a voxel in the volume: x fastest, in its page and among pages. Voxels that are not in pages are pages of one voxel.
 fn index_of(voxel: vec3u) -> u32 {
-    if PAGE_BITS == 0u {
-        return voxel.x + frame.dims.x * (voxel.y + frame.dims.y * voxel.z);
-    }
     let page = voxel >> vec3u(PAGE_BITS);
     let across = pages_across();
     let at = voxel & vec3u((1u << PAGE_BITS) - 1u);
@@ -34,9 +31,6 @@ fn index_of(voxel: vec3u) -> u32 {
 
 // The number of voxels in the volume, or in its pages.
 fn voxel_count() -> u32 {
-    if PAGE_BITS == 0u {
-        return frame.dims.x * frame.dims.y * frame.dims.z;
-    }
     let across = pages_across();
     return (across.x * across.y * across.z) << (3u * PAGE_BITS);
 }

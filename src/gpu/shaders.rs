@@ -427,8 +427,10 @@ impl Shader {
     /// The number of a binding of group 0 by its name in the shader; `None` if there is no such binding.
     pub fn binding(&self, name: &str) -> Option<u32> {
         self.files.iter().flat_map(|(_, text)| text.lines()).find_map(|line| {
-            let (number, declaration) = line.strip_prefix("@group(0) @binding(")?.split_once(')')?;
-            let declared = declaration.split_once(':')?.0.split_whitespace().last()?;
+            // In a page there is no space beside a sign.
+            let binding = line.strip_prefix("@group(0)")?.trim_start().strip_prefix("@binding(")?;
+            let (number, declaration) = binding.split_once(')')?;
+            let declared = declaration.split_once(':')?.0.rsplit([' ', '>']).next()?;
             if declared == name { number.parse().ok() } else { None }
         })
     }

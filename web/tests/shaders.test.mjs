@@ -17,7 +17,7 @@ const FORMATS = { first_hit: ["r32float"], resolve: ["rgba8unorm", "rgba32float"
 
 /** The constants of a shader with their values. */
 function overrides(source) {
-    const declared = [...source.matchAll(/^override (\w+): (\w+)/gm)].map(([, name, type]) => [name, type === "bool" ? [0, 1] : VALUES[name] ?? []]);
+    const declared = [...source.matchAll(/^override (\w+):\s*(\w+)/gm)].map(([, name, type]) => [name, type === "bool" ? [0, 1] : VALUES[name] ?? []]);
     return declared.filter(([, values]) => values.length > 0);
 }
 
@@ -52,7 +52,7 @@ test("pairs of constants are complete", () => {
 function pipelines(stage, source) {
     const constants = overrides(source);
     const compute = [...source.matchAll(/@compute[^{]*?fn (\w+)/g)].flatMap(([, entry]) => pairwise(constants).map((set) => ({ stage, compute: entry, set })));
-    const fragments = [...source.matchAll(/@fragment\s+fn (\w+)\(.*\) -> (?:@location\(0\) )?(\w+)/g)];
+    const fragments = [...source.matchAll(/@fragment\s+fn (\w+)\(.*\)\s*->\s*(?:@location\(0\)\s*)?(\w+)/g)];
     const render = fragments.flatMap(([, fragment, returned]) => {
         const targets = TARGETS[returned] ?? 1;
         // A group has as many sheets as the stage has targets.
