@@ -1,8 +1,8 @@
-//! Volumes that fit into no memory (SPEC §13): a ball of 2048³ `uint8` voxels in an OME-Zarr store, drawn with `--memory 2GiB`, and the volumes of scene files
-//! in chunks of 32³ and of 16³ voxels.
+//! Volumes that fit into no memory (SPEC §13): a ball of 2048³ `uint8` voxels in an OME-Zarr store, drawn with `--memory 2GiB`, a quarter of its bytes, and the
+//! volumes of scene files in chunks of 32³ and of 16³ voxels.
 //!
 //! `cargo bench --bench streaming -- [SIDE] FOLDER [SCENE…]` makes the stores in a folder, unless they are there (for 2048 voxels it takes 4 GB), and draws each
-//! by a whole process with either classification: seconds, chunks, and peak memory. Beside them stand the seconds that reading the same number of bytes takes,
+//! by a whole process with either backend and classification: seconds, chunks, and peak memory. Beside them stand the seconds that reading the same number of bytes takes,
 //! those of a level that fits into memory, and those of a scene's own volume in memory.
 
 #![expect(clippy::unwrap_used, reason = "a bench")]
@@ -27,6 +27,10 @@ const CHUNK: usize = 64;
 const CHUNKS_OF_SCENE: [usize; 2] = [32, 16];
 const LEVELS: usize = 4;
 
+/// The backends, each with a classification.
+type How = [&'static str; 2];
+const HOW: [How; 4] = [["cpu", "before"], ["cpu", "after"], ["gpu", "before"], ["gpu", "after"]];
+
 /// The ball's radius for a volume of side 1, and its ripples: along the radius, so that it is opaque from everywhere, with a surface that is not smooth.
 const RADIUS: f64 = 0.42;
 const RIPPLES: f64 = 40.0;
@@ -41,19 +45,20 @@ fn main() {
         println!("{} made in {:.0} s\n", store.display(), start.elapsed().as_secs_f64());
     }
     println!(
-        "| volume | classification | seconds | chunks read | of | of those with visible values | MB read | peak MiB |"
+        "| volume | backend | classification | seconds | chunks read | of | of those with visible values | MB read | peak MiB |"
     );
-    println!("|---|---|---|---|---|---|---|---|");
-    for classification in ["before", "after"] {
-        for (level, memory) in [(0, "2GiB"), (2, "16GiB")] {
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let memory = format!("{}MiB", side.pow(3) / 4 >> 20);
+    for how in HOW {
+        for (level, memory) in [(0, memory.as_str()), (2, "16GiB")] {
             let name = format!("{}³, `--memory {memory}`", side >> level);
             let level_of = level.to_string();
-            let run = draw(&store, &["--memory", memory, "--level", &level_of], &ball_sets(), classification, &folder);
+            let run = draw(&store, &["--memory", memory, "--level", &level_of], &ball_sets(), how, &folder);
             // Every chunk that the store holds is of the ball.
-            print_row(&name, classification, &run, count_files(&store.join(&level_of)));
+            print_row(&name, how, &run, count_files(&store.join(&level_of)));
             if level == 0 {
                 let reading = read(&store.join("0"), run.stats["chunks_read"].as_u64().unwrap());
-                println!("| | reading as many chunks alone | {reading:.1} | | | | | |");
+                println!("| | | reading as many chunks alone | {reading:.1} | | | | | |");
             }
         }
     }
@@ -92,23 +97,23 @@ fn draw_scene(name: &str, chunk: usize, folder: &Path) {
     let path = format!("volume.path={:?}", store.canonicalize().unwrap().display().to_string());
     let sets = ["splatting.compositing=exponential".to_owned(), "camera.fit=volume".to_owned()];
     let streamed = [sets.as_slice(), &[path]].concat();
-    for classification in ["before", "after"] {
-        let whole = draw(Path::new(name), &[], &sets, classification, folder);
-        print_row(&format!("{label} in memory"), classification, &whole, visible);
+    for how in HOW {
+        let whole = draw(Path::new(name), &[], &sets, how, folder);
+        print_row(&format!("{label} in memory"), how, &whole, visible);
         let index = index.display().to_string();
         let arguments = ["--memory", &memory, "--index", &index];
-        let run = draw(Path::new(name), &arguments, &streamed, classification, folder);
-        print_row(&format!("{label} in chunks of {chunk}³"), classification, &run, visible);
+        let run = draw(Path::new(name), &arguments, &streamed, how, folder);
+        print_row(&format!("{label} in chunks of {chunk}³"), how, &run, visible);
     }
 }
 
-fn print_row(name: &str, classification: &str, run: &Run, visible: usize) {
+fn print_row(name: &str, [backend, classification]: How, run: &Run, visible: usize) {
     let Run { seconds, stats, peak } = run;
     let of = |key: &str| stats[key].as_u64().map_or("–".to_owned(), |number| number.to_string());
     let megabytes = stats["bytes_read"].as_u64().map_or(0, |bytes| bytes / 1_000_000);
     let [read, total] = ["chunks_read", "chunks_total"].map(of);
     println!(
-        "| {name} | {classification} | {seconds:.1} | {read} | {total} | {visible} | {megabytes} | {} |",
+        "| {name} | {backend} | {classification} | {seconds:.1} | {read} | {total} | {visible} | {megabytes} | {} |",
         peak >> 20
     );
 }
@@ -134,14 +139,14 @@ struct Run {
 }
 
 /// Draws an input by the program.
-fn draw(input: &Path, arguments: &[&str], sets: &[String], classification: &str, folder: &Path) -> Run {
-    let (image, stats) = (folder.join(format!("{classification}.png")), folder.join("stats.json"));
+fn draw(input: &Path, arguments: &[&str], sets: &[String], [backend, classification]: How, folder: &Path) -> Run {
+    let (image, stats) = (folder.join(format!("{backend}-{classification}.png")), folder.join("stats.json"));
     let start = Instant::now();
     let sets = sets.iter().flat_map(|set| ["--set", set]);
     let mut process = Command::new(env!("CARGO_BIN_EXE_sheetsplat"))
         .arg("render")
         .arg(input)
-        .args(["--backend", "cpu"])
+        .args(["--backend", backend])
         .args(arguments)
         .args(sets)
         .args(["--set", &format!("splatting.classification={classification}")])

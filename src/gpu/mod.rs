@@ -13,8 +13,6 @@ pub(crate) mod gpu_volume;
 pub(crate) mod hiding;
 pub mod layout;
 pub(crate) mod options;
-#[cfg(not(target_arch = "wasm32"))]
-pub(crate) mod page_pool;
 pub(crate) mod placement;
 pub mod ramps;
 pub mod render_pipeline;

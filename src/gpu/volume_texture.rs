@@ -59,7 +59,7 @@ pub struct OwnColors<'a> {
     pub full: u32,
 }
 
-/// The slots of pages, where voxels are in pages ([`PagePool`](super::page_pool::PagePool)).
+/// The slots of pages, where voxels are in pages (`headless::boxed::page_pool`).
 #[derive(Clone, Copy, Debug)]
 pub struct Pages<'a> {
     /// `R32Uint`, a slot for every page, folded as voxels are: the pages of each channel's values, x fastest, then those of labels, then those of colours.

@@ -9,6 +9,8 @@ mod needed_pages;
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 mod open_pixels;
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+mod page_pool;
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 mod pages;
 mod source;
 

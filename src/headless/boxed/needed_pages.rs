@@ -4,8 +4,8 @@ use std::collections::HashSet;
 
 use glam::UVec3;
 
+use super::page_pool::ChannelPage;
 use crate::after::normalization::Normalization;
-use crate::gpu::page_pool::ChannelPage;
 use crate::gpu::volume_texture::ValueFormat;
 use crate::lists::brick::{self, Brick};
 use crate::volume::range::range_of;

@@ -28,6 +28,11 @@ impl OpenPixels {
         Self { region, counts }
     }
 
+    /// All pixels of a region.
+    pub(super) fn all(region: Region) -> Self {
+        Self::new(region, std::iter::repeat_n(true, region.pixels()))
+    }
+
     /// Whether a pixel is open of those between two places on the image, or around them.
     pub(super) fn any_between(&self, low: DVec2, high: DVec2) -> bool {
         let Region { x, y, width, height } = self.region;

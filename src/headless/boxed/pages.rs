@@ -5,22 +5,22 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap, HashMap, HashSet};
 use std::ops::{Range, RangeInclusive};
 
-use glam::{DVec2, UVec3};
+use glam::{DVec2, DVec3, UVec3};
 
 use super::channel::{LevelChunks, VoxelBox};
 use super::chunks::{Chunks, PIXELS, SLABS, Step};
 use super::needed_pages::{Needed, format_of, numbers_of, pages_around};
 use super::open_pixels::OpenPixels;
+use super::page_pool::{ChannelPage, PagePool, PageTexels};
 use crate::after::brick_ranges::Bearing;
 use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::gpu_volume::GpuVolume;
-use crate::gpu::page_pool::{ChannelPage, PagePool, PageTexels};
 use crate::gpu::shown_bricks::{BrickNeeds, shown_lists};
 use crate::headless::gpu::GpuHeadless;
-use crate::lists::brick::{Brick, BrickList, SIDE};
+use crate::lists::brick::{self, Brick, BrickList, SIDE};
 use crate::lists::classify::brick_list;
 use crate::lists::patch_bins::SHEETS;
 use crate::parallel::prelude::*;
@@ -261,24 +261,22 @@ impl<'a> Pages<'a> {
         if self.blocks.get(&block).is_some_and(|known| known.pages.is_empty()) && !self.chunks.counts_all() {
             return None;
         }
-        self.first_slab(self.voxels_of(block), open, slabs).map(|first| (first, block))
+        self.first_slab(bounds(self.voxels_of(block)), open, slabs).map(|first| (first, block))
     }
 
     /// The pages of a block, by their numbers there, of which open pixels may see something in some slabs.
     fn seen_pages(&self, at: UVec3, open: &OpenPixels, slabs: &Range<i32>) -> Vec<Reverse<Ahead>> {
         let pages = self.blocks.get(&at).into_iter().flat_map(|block| block.pages.iter().enumerate());
         let seen = pages.filter_map(|(number, drawn)| {
-            let first = self.first_slab(self.voxels_of_page(drawn.page), open, slabs)?;
+            let first = self.first_slab(bounds(self.voxels_of_page(drawn.page)), open, slabs)?;
             Some(Reverse((first, at.to_array(), number)))
         });
         seen.collect()
     }
 
-    /// The first of some slabs in which open pixels may see something of a box of voxels; at least a slab before it is reached.
-    fn first_slab(&self, VoxelBox { low, end }: VoxelBox, open: &OpenPixels, slabs: &Range<i32>) -> Option<i32> {
+    /// The first of some slabs in which open pixels may see something of a box of voxels, given by its middle and half its size; at least a slab before it is reached.
+    fn first_slab(&self, (middle, half): (DVec3, DVec3), open: &OpenPixels, slabs: &Range<i32>) -> Option<i32> {
         let (view, _, half_box) = self.chunks.geometry();
-        let half = (end - low - 1).as_dvec3() / 2.0;
-        let middle = low.as_dvec3() + half;
         let bounds = view.bounds(middle, half + half_box + ROUNDING)?;
         let (depths, slack) = (view.depths(middle, half + ROUNDING), SLABS * view.slabs.width);
         let own = view.slabs.covered(depths.start - slack..depths.end + slack)?;
@@ -410,11 +408,19 @@ impl<'a> Pages<'a> {
         let from = low << self.bits;
         let grid = self.grid().part(from, (across << self.bits).min(self.grid().dims - from));
         let known = || drawn.iter().filter_map(|(at, number)| self.blocks.get(at).map(|block| (block, *number)));
+        let open = match closed {
+            Some(closed) => OpenPixels::new(window.region, closed.iter().map(|is_closed| !is_closed)),
+            None => OpenPixels::all(window.region),
+        };
         let lists = (0..self.list_count()).map(|list| {
-            let bricks = known().flat_map(|(block, number)| &block.pages[number].lists[list]);
+            // A page lies partly in other windows, or behind closed pixels.
+            let bricks: Vec<&Brick> = known().flat_map(|(block, number)| &block.pages[number].lists[list]).collect();
+            let seen = bricks
+                .into_par_iter()
+                .filter(|brick| self.first_slab(brick::bounds(brick), &open, &window.slabs).is_some());
             let moved =
                 |brick: &Brick| Brick { x: brick.x - from.x, y: brick.y - from.y, z: brick.z - from.z, ..*brick };
-            BrickList::of_bricks(&grid, bricks.map(moved).collect())
+            BrickList::of_bricks(&grid, seen.map(moved).collect())
         });
         let lists = lists.collect();
         // A channel of which a page is not needed has holes there.
@@ -472,4 +478,10 @@ impl<'a> Pages<'a> {
             held -= self.blocks.remove(&at).map_or(0, |block| block.bytes);
         }
     }
+}
+
+/// The middle of a box of voxels, and half its size.
+fn bounds(VoxelBox { low, end }: VoxelBox) -> (DVec3, DVec3) {
+    let half = (end - low - 1).as_dvec3() / 2.0;
+    (low.as_dvec3() + half, half)
 }

@@ -121,7 +121,7 @@ impl<'a> Source<'a> {
             Self::Pages(pages) => {
                 let open = match is_open {
                     Some(is_open) => OpenPixels::new(*region, is_open.iter().copied()),
-                    None => OpenPixels::new(*region, std::iter::repeat_n(true, region.pixels())),
+                    None => OpenPixels::all(*region),
                 };
                 let step = pages.step((region, &open), slabs, is_open.is_some())?;
                 step.map(|(slabs, needed)| (slabs, needed.map(Needed::Pages)))

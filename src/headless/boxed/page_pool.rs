@@ -7,11 +7,11 @@ use std::ops::Range;
 use glam::UVec3;
 use wgpu::{Device, Extent3d, Origin3d, Queue, Texture, TextureFormat};
 
-use super::fault::scoped;
-use super::gpu_volume::Paged;
-use super::volume_texture::{ValueFormat, VolumeTexture};
 use crate::after::normalization::Normalization;
 use crate::error::RenderError;
+use crate::gpu::fault::scoped;
+use crate::gpu::gpu_volume::Paged;
+use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
 use crate::lists::brick::BrickList;
 use crate::volume::{HollowChannel, Texel, ValueSlice, Volume};
 
@@ -25,11 +25,11 @@ const SENT: u32 = 256;
 const LEAST_BYTES: u64 = 1 << 16;
 
 /// A page of a channel: the channel's number among those that are drawn, and the page's place along each axis.
-pub(crate) type ChannelPage = (usize, UVec3);
+pub(super) type ChannelPage = (usize, UVec3);
 
 /// What the voxels of a page are, x fastest; beyond the volume's end they are any.
 #[derive(Clone, Debug)]
-pub(crate) struct PageTexels {
+pub(super) struct PageTexels {
     /// In the pool's format.
     values: Vec<u8>,
     labels: Vec<u16>,
@@ -45,7 +45,7 @@ struct Held {
 
 /// Textures of slots. The first slot stands for all pages that are not needed: where values are stored by their bits, it is a page of holes.
 #[derive(Debug)]
-pub(crate) struct PagePool {
+pub(super) struct PagePool {
     device: Device,
     queue: Queue,
     /// The bits of a voxel's place in its page along each axis.
@@ -74,7 +74,7 @@ impl PagePool {
     ///
     /// # Errors
     /// If the device has not even room for a few pages, or fails.
-    pub(crate) fn new(
+    pub(super) fn new(
         (device, queue): (&Device, &Queue),
         bits: u32,
         (channels, format): (Vec<HollowChannel>, ValueFormat),
@@ -106,7 +106,7 @@ impl PagePool {
     ///
     /// # Errors
     /// As for [`Self::new`].
-    pub(crate) fn widen(&mut self, least: usize) -> Result<(), RenderError> {
+    pub(super) fn widen(&mut self, least: usize) -> Result<(), RenderError> {
         let old = [Some(&self.values), self.labels.as_ref(), self.colors.as_ref()];
         old.into_iter().flatten().for_each(|(texture, _)| texture.destroy());
         let of = (&self.channels[..], ValueFormat::Bits);
@@ -129,17 +129,17 @@ impl PagePool {
     }
 
     /// How values are stored.
-    pub(crate) fn format(&self) -> ValueFormat {
+    pub(super) fn format(&self) -> ValueFormat {
         self.format
     }
 
     /// The most pages that can be held at a time.
-    pub(crate) fn capacity(&self) -> usize {
+    pub(super) fn capacity(&self) -> usize {
         self.capacity
     }
 
     /// The bytes of all slots.
-    pub(crate) fn bytes(&self) -> u64 {
+    pub(super) fn bytes(&self) -> u64 {
         [Some(&self.values), self.labels.as_ref(), self.colors.as_ref()]
             .into_iter()
             .flatten()
@@ -147,17 +147,17 @@ impl PagePool {
             .sum()
     }
 
-    pub(crate) fn device(&self) -> &Device {
+    pub(super) fn device(&self) -> &Device {
         &self.device
     }
 
     /// What a channel has.
-    pub(crate) fn channel(&self, number: usize) -> HollowChannel {
+    pub(super) fn channel(&self, number: usize) -> HollowChannel {
         self.channels[number]
     }
 
     /// Begins to draw from some pages, which stay until the next call, and tells which of them are not held.
-    pub(crate) fn need(&mut self, pages: &[ChannelPage]) -> Vec<ChannelPage> {
+    pub(super) fn need(&mut self, pages: &[ChannelPage]) -> Vec<ChannelPage> {
         self.clock += 1;
         let mut missing = Vec::new();
         for page in pages {
@@ -170,7 +170,7 @@ impl PagePool {
     }
 
     /// Takes a page up, if it is not held already, in place of those that were not needed for the longest time; does nothing if all are needed.
-    pub(crate) fn put(&mut self, page: ChannelPage, texels: &PageTexels) {
+    pub(super) fn put(&mut self, page: ChannelPage, texels: &PageTexels) {
         if self.held.contains_key(&page) {
             return;
         }
@@ -212,7 +212,7 @@ impl PagePool {
     ///
     /// # Errors
     /// If the device has no room for the slots' numbers, or fails.
-    pub(crate) fn paged(
+    pub(super) fn paged(
         &self,
         (low, across): (UVec3, UVec3),
         needed: &[ChannelPage],
@@ -278,7 +278,7 @@ fn textures(
 
 impl PageTexels {
     /// The page that begins at a voxel of a box, in a format; `None` if that cannot store a value.
-    pub(crate) fn cut_out(volume: &Volume, from: UVec3, bits: u32, format: ValueFormat) -> Option<Self> {
+    pub(super) fn cut_out(volume: &Volume, from: UVec3, bits: u32, format: ValueFormat) -> Option<Self> {
         let (side, grid) = (1 << bits, volume.grid());
         let dims = (grid.dims - from).min(UVec3::splat(side));
         let rows = (0..dims.y * dims.z).map(|row| {
