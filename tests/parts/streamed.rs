@@ -128,8 +128,7 @@ fn pages_are_kept() {
     let (image, counts, reads, listed) = draw(8 << 20);
     assert!(reads < 3 * counts.chunks_read, "{reads} {counts:?}");
     // A page lies in several windows; those of its voxels that one does not show are not drawn there.
-    eprintln!("LISTED {listed} of {whole}");
-    assert!(listed < 2 * whole, "{listed} {whole}");
+    assert!(2 * listed < 3 * whole, "{listed} {whole}");
     // With few slots pages go and come back.
     let (few, counts, again, _) = draw(1 << 19);
     assert!(again > 2 * reads, "{again} {reads} {counts:?}");
