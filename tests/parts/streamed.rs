@@ -159,6 +159,18 @@ fn decoded_chunks_are_kept() {
     assert_at_least(psnr(&few.pixels, &image.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, "in less memory");
 }
 
+/// Of a chunk that is read in parts, their bytes count together, but never more than the chunk has.
+#[test]
+fn bytes_of_a_chunks_parts_add_up() {
+    let (volume, scene) = head(64, &[SEEN_ANYWHERE]);
+    for backend in [Backend::Reference, Backend::Gpu] {
+        let store = MemoryStore::new(&volume, volume.dims());
+        let drawn = headless(backend).render_volume(streamed(&volume, store, 1 << 20), &scene).unwrap();
+        let counts = drawn.stats.store.unwrap();
+        assert_eq!((counts.chunks_read, counts.bytes_read), (1, volume.values().len() as u64), "{backend}");
+    }
+}
+
 /// What becomes of a voxel, given by its index, and its value.
 type Change<'a> = &'a dyn Fn(usize, f32) -> f32;
 

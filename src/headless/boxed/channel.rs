@@ -1,6 +1,6 @@
 //! The chunks of one channel of a volume that is streamed: of its values and of its labels.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::{DVec3, UVec3};
@@ -218,16 +218,10 @@ pub(in crate::headless) fn opaque_values(transfer: &TransferFunction) -> ValueSe
 pub(super) struct LevelChunks<'a> {
     of: &'a StreamedLevel,
     level: StoreLevel,
-    tally: Mutex<Tally>,
+    /// The chunks of which something was read, and the bytes of the store that this took.
+    tally: Mutex<HashMap<UVec3, u64>>,
     /// Chunks, if the store decodes them as a whole, and there is room for as many as are read at once.
     kept: Option<Kept>,
-}
-
-/// The chunks of which something was read, and their bytes in the store, each chunk's once.
-#[derive(Debug, Default)]
-struct Tally {
-    chunks: HashSet<UVec3>,
-    bytes: u64,
 }
 
 /// The values of some voxels, their range, and the voxels' colours if they have any.
@@ -272,15 +266,15 @@ impl<'a> LevelChunks<'a> {
 
     /// The number of chunks of which something was read.
     pub(super) fn chunks_read(&self) -> u64 {
-        self.tally().chunks.len() as u64
+        self.tally().len() as u64
     }
 
-    /// Their bytes in the store, each chunk's once.
+    /// The bytes of the store that reading them took, without those of reading again.
     pub(super) fn bytes_read(&self) -> u64 {
-        self.tally().bytes
+        self.tally().values().sum()
     }
 
-    fn tally(&self) -> MutexGuard<'_, Tally> {
+    fn tally(&self) -> MutexGuard<'_, HashMap<UVec3, u64>> {
         self.tally.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -313,12 +307,24 @@ impl<'a> LevelChunks<'a> {
             let first = |row: u32| grid.index_of(from - low + UVec3::new(0, row % dims.y, row / dims.y)) as usize;
             put(&voxels.values, dims.x, &mut all.values, first);
             put(&voxels.colors, dims.x, &mut all.colors, first);
-            let mut tally = self.tally();
-            if let Some(bytes) = bytes.filter(|_| tally.chunks.insert(chunk)) {
-                tally.bytes += bytes;
+            if let Some(bytes) = bytes {
+                self.count(chunk, dims, bytes);
             }
         }
         Ok(all)
+    }
+
+    /// Counts the bytes that reading a part of a chunk took, given by its voxels along each axis. Parts may share voxels, but a chunk has no more bytes than all of
+    /// its voxels.
+    fn count(&self, chunk: UVec3, dims: UVec3, bytes: u64) {
+        let voxels = |dims: UVec3| dims.as_u64vec3().element_product();
+        let first = chunk * self.level.chunk;
+        let whole = self.level.chunk.min(self.level.grid.dims - first);
+        let of_all = || bytes.div_ceil(voxels(dims)).saturating_mul(voxels(whole));
+        let most = if self.of.store.decodes_whole_chunks() { bytes } else { of_all() };
+        let mut tally = self.tally();
+        let counted = tally.entry(chunk).or_default();
+        *counted = (*counted + bytes).min(most.max(*counted));
     }
 
     /// Reads the part of a chunk that lies in a box.
