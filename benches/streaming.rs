@@ -48,7 +48,7 @@ fn main() {
         "| volume | backend | classification | seconds | chunks read | of | of those with visible values | MB read | peak MiB |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    let memory = format!("{}MiB", side.pow(3) / 4 >> 20);
+    let memory = format!("{}MiB", (side.pow(3) / 4) >> 20);
     for how in HOW {
         for (level, memory) in [(0, memory.as_str()), (2, "16GiB")] {
             let name = format!("{}³, `--memory {memory}`", side >> level);
