@@ -239,6 +239,29 @@ fn what_boxes_in_front_hide_is_not_drawn() {
     }
 }
 
+/// After splatting voxels bear on others around them; but those of what opaque pixels hide are not read for that.
+#[test]
+fn what_pages_hide_is_not_read() {
+    let dims = UVec3::new(96, 36, 36);
+    let value = |index: u32| 200.0 - (index / 96 % 7) as f32;
+    let volume = Volume::new("wall", dims, DVec3::ONE, (0..dims.element_product()).map(value).collect()).unwrap();
+    let (_, scene) = head(
+        8,
+        &[
+            "camera={direction=[1,0.01,0.02],height=10}",
+            "splatting={opacity_threshold=0.95,classification=\"after\"}",
+            "transfer.opacity=[[100,0],[150,0.9]]",
+        ],
+    );
+    let headless = headless(Backend::Gpu);
+    let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
+    let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(32)));
+    let drawn = headless.render_volume(store::streamed(store.clone(), 0, &volume, 1 << 19), &scene).unwrap();
+    assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, [0.2, 0.4, 0.6, 0.5], 500), 40.0, "wall");
+    let read = store.read.lock().unwrap();
+    assert!(!read.is_empty() && read.iter().all(|low| low[0] < 64), "{read:?}");
+}
+
 /// Holes are no neighbours for gradients, in boxes neither.
 #[test]
 fn boxes_with_holes_are_the_volume_in_memory() {

@@ -32,6 +32,13 @@ pub(super) struct VoxelBox {
 }
 
 impl VoxelBox {
+    /// Its middle, and half its size, in voxels.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(super) fn bounds(&self) -> (DVec3, DVec3) {
+        let half = (self.end - self.low - 1).as_dvec3() / 2.0;
+        (self.low.as_dvec3() + half, half)
+    }
+
     /// The number of voxels.
     pub(super) fn voxels(&self) -> u64 {
         (self.end - self.low).to_array().iter().fold(1, |all: u64, &n| all.saturating_mul(n.into()))
@@ -97,23 +104,25 @@ impl<'a> ChannelChunks<'a> {
         (size_of::<f32>() + colors + labels) as u64
     }
 
-    /// Reads a box of the channel, whose voxels lie on a grid; `None` if nothing can be seen of the box, or of one in it.
+    /// Reads some parts of a box of the channel, whose voxels lie on a grid, and leaves holes in the rest; `None` if nothing can be seen of the parts, or of a box
+    /// in them.
     ///
     /// # Errors
     /// If a store cannot be read, or holds a value that is no label.
     pub(super) fn read(
         &self,
-        (within, seen): (VoxelBox, VoxelBox),
+        (within, parts): (VoxelBox, &[VoxelBox]),
+        seen: VoxelBox,
         grid: &Grid,
     ) -> Result<Option<Volume>, RenderError> {
         if !self.is_visible(seen)? {
             return Ok(None);
         }
-        let voxels = self.values.read(within)?;
+        let voxels = self.values.read((within, parts), f32::NAN)?;
         if !self.counts_all && !self.has_opaque(voxels.range) {
             return Ok(None);
         }
-        self.with_labels(voxels, within, grid).map(Some)
+        self.with_labels(voxels, (within, parts), grid).map(Some)
     }
 
     /// Reads a box of the channel, whose voxels lie on a grid, seen or not.
@@ -122,21 +131,22 @@ impl<'a> ChannelChunks<'a> {
     /// If a store cannot be read, or holds a value that is no label.
     #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
     pub(super) fn read_all(&self, within: VoxelBox, grid: &Grid) -> Result<Volume, RenderError> {
-        self.with_labels(self.values.read(within)?, within, grid)
+        let parts = (within, &[within][..]);
+        self.with_labels(self.values.read(parts, f32::NAN)?, parts, grid)
     }
 
-    /// A volume of the voxels of a box, with their labels, which are read.
+    /// A volume of the voxels of a box, with the labels of some parts of it, which are read.
     fn with_labels(
         &self,
         Voxels { values, colors, .. }: Voxels,
-        within: VoxelBox,
+        (within, parts): (VoxelBox, &[VoxelBox]),
         grid: &Grid,
     ) -> Result<Volume, RenderError> {
         let volume = Volume::punched(*grid, values);
         let volume = if self.values.of.store.has_colors() { volume.with_texels(colors) } else { volume };
         let Some(labels) = &self.labels else { return Ok(volume) };
         let origin = labels.of.origin.clone();
-        let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read(within)?.values)?;
+        let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read((within, parts), 0.0)?.values)?;
         let labels = Labels { origin, dims: grid.dims, spacing: None, values, names: BTreeMap::new() };
         Ok(volume.with_labels(labels)?)
     }
@@ -157,7 +167,7 @@ impl<'a> ChannelChunks<'a> {
             let ends = (UVec3::MAX, UVec3::ZERO);
             let (low, last) = block.iter().fold(ends, |(low, last), &at| (low.min(voxels[at]), last.max(voxels[at])));
             let (within, grid) = (VoxelBox { low, end: last + 1 }, Grid::new(last + 1 - low, DVec3::ONE));
-            let own = labels_of(&labels.of.origin, (low, grid.dims, 1), labels.read(within)?.values)?;
+            let own = labels_of(&labels.of.origin, (low, grid.dims, 1), labels.read((within, &[within]), 0.0)?.values)?;
             block.into_iter().for_each(|at| found[at] = own[grid.index_of(voxels[at] - low) as usize]);
         }
         Ok(found)
@@ -294,14 +304,15 @@ impl<'a> LevelChunks<'a> {
         between(low / self.level.chunk, (end - 1) / self.level.chunk)
     }
 
-    /// Reads the voxels of a box.
-    fn read(&self, within: VoxelBox) -> Result<Voxels, VolumeError> {
+    /// Reads the voxels of some parts of a box; the others have a value that stands for what is not read.
+    fn read(&self, (within, parts): (VoxelBox, &[VoxelBox]), unread: f32) -> Result<Voxels, VolumeError> {
         let VoxelBox { low, end } = within;
-        let chunks: Vec<UVec3> = self.chunks(within).collect();
+        let chunks = parts.iter().flat_map(|&part| self.chunks(part).map(move |chunk| (chunk, part)));
+        let chunks: Vec<(UVec3, VoxelBox)> = chunks.collect();
         let grid = self.level.grid.part(low, end - low);
-        let pieces = chunks.into_par_iter().map(|chunk| self.piece(chunk, within));
+        let pieces = chunks.into_par_iter().map(|(chunk, part)| self.piece(chunk, part));
         let pieces = pieces.collect::<Result<Vec<_>, _>>()?;
-        let mut all = Voxels::filled(&*self.of.store, grid.dims.element_product(), f32::NAN);
+        let mut all = Voxels::filled(&*self.of.store, grid.dims.element_product(), unread);
         for Piece { chunk, low: from, dims, voxels, bytes } in pieces {
             all.range = union(all.range, voxels.range);
             let first = |row: u32| grid.index_of(from - low + UVec3::new(0, row % dims.y, row / dims.y)) as usize;

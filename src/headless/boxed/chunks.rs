@@ -124,22 +124,26 @@ impl<'a> Chunks<'a> {
     /// # Errors
     /// If a store cannot be read, or holds a value that is no label.
     pub(super) fn read(&mut self, within: VoxelBox) -> Result<Option<Filled>, RenderError> {
-        let filled = self.read_seen(within, within)?;
+        let filled = self.read_parts((within, &[within]), within)?;
         if filled.is_some() {
             self.most_held = self.most_held.max(within.voxels().saturating_mul(self.voxel_bytes()));
         }
         Ok(filled)
     }
 
-    /// As [`Self::read`], in every channel that may show something in a box within.
+    /// As [`Self::read`], in every channel that may show something in a box within; what lies in none of some parts is not read, and has holes.
     ///
     /// # Errors
     /// As for [`Self::read`].
-    pub(super) fn read_seen(&self, within: VoxelBox, seen: VoxelBox) -> Result<Option<Filled>, RenderError> {
+    pub(super) fn read_parts(
+        &self,
+        (within, parts): (VoxelBox, &[VoxelBox]),
+        seen: VoxelBox,
+    ) -> Result<Option<Filled>, RenderError> {
         let grid = self.volume.grid().part(within.low, within.end - within.low);
         let (mut filled, mut numbers) = (Vec::new(), Vec::new());
         for channel in &self.channels {
-            if let Some(volume) = channel.read((within, seen), &grid)? {
+            if let Some(volume) = channel.read((within, parts), seen, &grid)? {
                 filled.push(volume);
                 numbers.push(channel.number);
             }

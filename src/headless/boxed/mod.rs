@@ -1,6 +1,8 @@
 //! Volumes that fit into no memory, drawn by a backend that draws volumes in memory: region by region, front to back, each time as many slabs (SPEC §11) as
 //! the box of voxels holds that bears on them. Where a region is opaque, no more boxes are read.
 
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+mod block;
 mod channel;
 mod chunks;
 mod kept;

@@ -7,6 +7,7 @@ use std::ops::{Range, RangeInclusive};
 
 use glam::{DVec2, DVec3, UVec3};
 
+use super::block::{ALL, Block, Division, DrawnPage, OWN, Parts, Rim};
 use super::channel::{LevelChunks, VoxelBox};
 use super::chunks::{Chunks, PIXELS, SLABS, Step};
 use super::needed_pages::{Needed, format_of, numbers_of, pages_around};
@@ -62,11 +63,7 @@ pub(super) struct Pages<'a> {
     /// What the values of each channel are splatted as.
     numbers: Vec<Normalization>,
     pool: PagePool,
-    bits: u32,
-    /// The voxels along each axis of a block, whole pages.
-    side: UVec3,
-    /// The voxels around a block, in whole bricks, by which it is known which of its voxels are drawn.
-    rim: UVec3,
+    division: Division,
     /// The slabs that are drawn at a time where opaque pixels may hide those behind them.
     depth: i32,
     /// The blocks that were read, by their places.
@@ -75,27 +72,6 @@ pub(super) struct Pages<'a> {
     ahead: Vec<UVec3>,
     /// Counts windows.
     clock: u64,
-}
-
-/// What is known of a block: what is drawn of its pages. Nothing is drawn of one without any.
-#[derive(Debug)]
-struct Block {
-    pages: Vec<DrawnPage>,
-    /// The bytes of all bricks.
-    bytes: u64,
-    has_holes: bool,
-    /// The window for which it was used last.
-    used: u64,
-}
-
-/// What is drawn of a page.
-#[derive(Debug)]
-struct DrawnPage {
-    page: UVec3,
-    /// The bricks of its voxels in each list, where they lie in the volume.
-    lists: Vec<Vec<Brick>>,
-    /// The pages that these need, with those of their neighbours.
-    needed: Vec<ChannelPage>,
 }
 
 /// A window's voxels: the blocks and the numbers of their pages that are drawn, all pages that these need, and a box around them.
@@ -164,7 +140,8 @@ impl<'a> Pages<'a> {
         let depth = ((deep / view.slabs.width).ceil() as i32).max(1);
         let rim = rim.map(|n| n.next_multiple_of(SIDE));
         let (blocks, ahead) = (HashMap::new(), Vec::new());
-        Ok(Some(Self { chunks, gpu, scene, needs, numbers, pool, bits, side, rim, depth, blocks, ahead, clock: 0 }))
+        let division = Division { dims: grid.dims, bits, side, rim };
+        Ok(Some(Self { chunks, gpu, scene, needs, numbers, pool, division, depth, blocks, ahead, clock: 0 }))
     }
 
     pub(super) fn chunks(&self) -> &Chunks<'a> {
@@ -201,7 +178,7 @@ impl<'a> Pages<'a> {
         let mut end = if hides { slabs.end.min(limit.max(slabs.start + 1)) } else { slabs.end };
         let mut blocks = self.seen_blocks((region, open), slabs.start..end);
         blocks.sort_unstable_by_key(|&(first, block)| Reverse((first, block.to_array())));
-        let nearest = blocks.last().map(|&(_, block)| ((block * self.side) >> self.bits, UVec3::ONE));
+        let nearest = blocks.last().map(|&(_, block)| ((block * self.division.side) >> self.division.bits, UVec3::ONE));
         let (mut drawn, mut needed) = (Vec::new(), Needed::default());
         // The pages of blocks that were read, by the first slab in which they are seen. A page is seen no sooner than its block.
         let mut ahead = BinaryHeap::new();
@@ -210,7 +187,7 @@ impl<'a> Pages<'a> {
             if blocks.last().is_some_and(|&(first, _)| first <= nearest) {
                 let batch = blocks.split_off(blocks.len().saturating_sub(current_num_threads()));
                 let capacity = self.pool.capacity();
-                self.know(batch.iter().map(|&(_, block)| block))?;
+                self.know(batch.iter().map(|&(_, block)| block), (open, &(slabs.start..end)))?;
                 if self.pool.capacity() < capacity {
                     // Values need more bits than it seemed, so that there is no room for what has been chosen.
                     return self.step((region, open), slabs, hides);
@@ -224,8 +201,9 @@ impl<'a> Pages<'a> {
             let at = UVec3::from(at);
             let Some(block) = self.blocks.get_mut(&at) else { continue };
             block.used = self.clock;
+            let pages = self.needed_pages((at, number), (open, &(slabs.start..end)));
             // Slots are fewer once values need more bits.
-            if !needed.add(&block.pages[number].needed, (self.pool.capacity(), most_voxels), self.bits) {
+            if !needed.add(&pages, (self.pool.capacity(), most_voxels), self.division.bits) {
                 // Of slabs before the first one of a page that has no slot everything is drawn.
                 end = if group(first) > slabs.start { group(first) } else { first };
                 break;
@@ -246,7 +224,7 @@ impl<'a> Pages<'a> {
     /// The blocks of which open pixels may see something in some slabs, and nothing is known or something is drawn; each with the first slab in which it is seen.
     fn seen_blocks(&self, (region, open): (&Region, &OpenPixels), slabs: Range<i32>) -> Vec<(i32, UVec3)> {
         let Some(VoxelBox { low, end }) = self.chunks.needed(region, &slabs) else { return Vec::new() };
-        let (first, last) = (low / self.side, (end - 1) / self.side);
+        let (first, last) = (low / self.division.side, (end - 1) / self.division.side);
         let rows = (first.z..=last.z).flat_map(|z| (first.y..=last.y).map(move |y| [y, z]));
         let rows: Vec<[u32; 2]> = rows.collect();
         let in_row = |[y, z]: [u32; 2]| {
@@ -258,20 +236,62 @@ impl<'a> Pages<'a> {
 
     /// Whether open pixels may see something of a block in some slabs, and in which one first.
     fn seen(&self, block: UVec3, open: &OpenPixels, slabs: &Range<i32>) -> Option<(i32, UVec3)> {
-        if self.blocks.get(&block).is_some_and(|known| known.pages.is_empty()) && !self.chunks.counts_all() {
-            return None;
-        }
-        self.first_slab(bounds(self.voxels_of(block)), open, slabs).map(|first| (first, block))
+        let first = self.first_slab(self.division.voxels_of(block).bounds(), open, slabs)?;
+        let is_empty = || self.blocks.get(&block).is_some_and(|known| known.pages.is_empty());
+        let shows_nothing =
+            !self.chunks.counts_all() && is_empty() && self.missing_parts(block, (open, slabs)).is_none();
+        (!shows_nothing).then_some((first, block))
+    }
+
+    /// Those parts of a block and its rim by which it must be known what open pixels may see in some slabs, if they are more than those by which it is known: after
+    /// splatting those that are seen themselves, before splatting all.
+    fn missing_parts(&self, block: UVec3, (open, slabs): (&OpenPixels, &Range<i32>)) -> Option<Parts> {
+        let is_seen = |part: &VoxelBox| self.needs.is_none() || self.first_slab(part.bounds(), open, slabs).is_some();
+        let parts = self.division.rim_of(block).parts();
+        let wanted = parts.filter(|(_, part)| is_seen(part)).fold(OWN, |wanted, (part, _)| wanted | part);
+        let known = self.blocks.get(&block).map_or(0, |block| block.parts);
+        (known & wanted != wanted).then_some(known | wanted)
     }
 
     /// The pages of a block, by their numbers there, of which open pixels may see something in some slabs.
     fn seen_pages(&self, at: UVec3, open: &OpenPixels, slabs: &Range<i32>) -> Vec<Reverse<Ahead>> {
         let pages = self.blocks.get(&at).into_iter().flat_map(|block| block.pages.iter().enumerate());
         let seen = pages.filter_map(|(number, drawn)| {
-            let first = self.first_slab(bounds(self.voxels_of_page(drawn.page)), open, slabs)?;
+            let first = self.first_slab(self.division.voxels_of_page(drawn.page).bounds(), open, slabs)?;
             Some(Reverse((first, at.to_array(), number)))
         });
         seen.collect()
+    }
+
+    /// The pages of a block's page, given by its number there, and of its neighbours that are needed for what open pixels may see of it in some slabs.
+    fn needed_pages(
+        &self,
+        (at, number): (UVec3, usize),
+        (open, slabs): (&OpenPixels, &Range<i32>),
+    ) -> Vec<ChannelPage> {
+        let Some(block) = self.blocks.get(&at) else { return Vec::new() };
+        let is_seen = |brick: &&Brick| self.first_slab(brick::bounds(brick), open, slabs).is_some();
+        let lists = block.pages[number].lists.iter().enumerate();
+        lists.flat_map(|(list, bricks)| self.needed_by(bricks.iter().filter(is_seen), list, &block.channels)).collect()
+    }
+
+    /// The pages that the bricks of a page in a list need, in the channels that are present.
+    fn needed_by<'b>(
+        &self,
+        bricks: impl Iterator<Item = &'b Brick>,
+        list: usize,
+        present: &[usize],
+    ) -> Vec<ChannelPage> {
+        let mut pages: Vec<UVec3> = Vec::new();
+        for page in bricks.flat_map(|brick| pages_around(brick, self.grid().dims, self.division.bits)) {
+            if !pages.contains(&page) {
+                pages.push(page);
+            }
+        }
+        // After splatting each channel has a list.
+        let own = [list];
+        let channels = if self.needs.is_some() { &own } else { present };
+        pages.iter().flat_map(|&page| channels.iter().map(move |&channel| (channel, page))).collect()
     }
 
     /// The first of some slabs in which open pixels may see something of a box of voxels, given by its middle and half its size; at least a slab before it is reached.
@@ -285,27 +305,20 @@ impl<'a> Pages<'a> {
         is_seen.then_some(own.start)
     }
 
-    /// The voxels of a page.
-    fn voxels_of_page(&self, page: UVec3) -> VoxelBox {
-        let low = page << self.bits;
-        VoxelBox { low, end: (low + (1 << self.bits)).min(self.grid().dims) }
-    }
-
-    /// The voxels of a block.
-    fn voxels_of(&self, block: UVec3) -> VoxelBox {
-        let low = block * self.side;
-        VoxelBox { low, end: (low + self.side).min(self.grid().dims) }
-    }
-
-    /// Reads those blocks that are not known.
-    fn know(&mut self, blocks: impl Iterator<Item = UVec3>) -> Result<(), RenderError> {
-        let read = self.read_all(blocks.filter(|block| !self.blocks.contains_key(block)).collect())?;
+    /// Reads those blocks of which it is not known what open pixels may see in some slabs.
+    fn know(
+        &mut self,
+        blocks: impl Iterator<Item = UVec3>,
+        seen: (&OpenPixels, &Range<i32>),
+    ) -> Result<(), RenderError> {
+        let missing = blocks.filter_map(|block| Some((block, self.missing_parts(block, seen)?)));
+        let read = self.read_all(missing.collect())?;
         self.take(read)
     }
 
-    /// Reads blocks, each with its place.
-    fn read_all(&self, blocks: Vec<UVec3>) -> Result<Vec<(UVec3, Read)>, RenderError> {
-        blocks.into_par_iter().map(|block| Ok((block, self.read(block)?))).collect()
+    /// Reads parts of blocks and their rims, each with its block's place.
+    fn read_all(&self, blocks: Vec<(UVec3, Parts)>) -> Result<Vec<(UVec3, Read)>, RenderError> {
+        blocks.into_par_iter().map(|(block, parts)| Ok((block, self.read(block, parts)?))).collect()
     }
 
     /// Notes what was read.
@@ -330,50 +343,55 @@ impl<'a> Pages<'a> {
         Ok(true)
     }
 
-    /// Reads a block: what is known of it, and those of its pages that it needs itself.
-    fn read(&self, at: UVec3) -> Result<Read, RenderError> {
-        let own = self.voxels_of(at);
-        let dims = self.grid().dims;
-        let within = VoxelBox { low: own.low.saturating_sub(self.rim), end: (own.end + self.rim).min(dims) };
-        let mut block = Block { pages: Vec::new(), bytes: 0, has_holes: false, used: self.clock };
-        let Some((volume, numbers)) = self.chunks.read_seen(within, own)? else { return Ok((block, Vec::new())) };
-        block.has_holes = volume.channels().any(|channel| channel.holes() > 0);
-        // The channels of the volume, by their numbers among those that are drawn.
+    /// Reads parts of a block and its rim: what is known of it, and those of its pages that it needs itself.
+    fn read(&self, at: UVec3, parts: Parts) -> Result<Read, RenderError> {
+        let rim = self.division.rim_of(at);
+        let Rim { own, within } = rim;
+        let mut block = Block { parts, used: self.clock, ..Block::default() };
+        let boxes = rim.boxes(parts);
+        let Some((volume, numbers)) = self.chunks.read_parts((within, &boxes), own)? else {
+            return Ok((block, Vec::new()));
+        };
+        let unread = within.voxels() - boxes.iter().map(VoxelBox::voxels).sum::<u64>();
+        block.has_holes = volume.channels().any(|channel| channel.holes() > unread);
         let drawn = self.chunks.channels().enumerate().filter(|(_, channel)| numbers.contains(&channel.number));
-        let present: Vec<usize> = drawn.map(|(at, _)| at).collect();
-        let are_apart = self.needs.is_some();
+        block.channels = drawn.map(|(at, _)| at).collect();
         let mut pages = BTreeMap::new();
-        for (number, list) in self.lists(&volume, &present).iter().enumerate() {
-            let channels = if are_apart { &present[number..=number] } else { &present[..] };
+        for (number, list) in self.lists(&volume, &block.channels).iter().enumerate() {
+            let list_of = if self.needs.is_some() { block.channels[number] } else { 0 };
             for brick in list.bricks() {
                 let at = within.low + UVec3::new(brick.x, brick.y, brick.z);
                 if at.cmplt(own.low).any() || at.cmpge(own.end).any() {
                     continue;
                 }
-                let brick = Brick { x: at.x, y: at.y, z: at.z, ..*brick };
-                let (lists, needed): &mut (Vec<Vec<Brick>>, HashSet<ChannelPage>) = pages
-                    .entry((at >> self.bits).to_array())
-                    .or_insert_with(|| (vec![Vec::new(); self.list_count()], HashSet::new()));
-                lists[if are_apart { present[number] } else { 0 }].push(brick);
-                for page in pages_around(&brick, dims, self.bits) {
-                    needed.extend(channels.iter().map(|&channel| (channel, page)));
-                }
+                let lists: &mut Vec<Vec<Brick>> = pages
+                    .entry((at >> self.division.bits).to_array())
+                    .or_insert_with(|| vec![Vec::new(); self.list_count()]);
+                lists[list_of].push(Brick { x: at.x, y: at.y, z: at.z, ..*brick });
                 block.bytes += size_of::<Brick>() as u64;
             }
         }
-        for (page, (lists, needed)) in pages {
-            block.pages.push(DrawnPage { page: page.into(), lists, needed: needed.into_iter().collect() });
+        let mut needed = HashSet::new();
+        for (page, lists) in pages {
+            for (list, bricks) in lists.iter().enumerate() {
+                needed.extend(self.needed_by(bricks.iter(), list, &block.channels));
+            }
+            block.pages.push(DrawnPage { page: page.into(), lists });
         }
-        let all: HashSet<ChannelPage> = block.pages.iter().flat_map(|drawn| &drawn.needed).copied().collect();
         let texels = |(channel, page): ChannelPage| {
-            let low = self.voxels_of_page(page).low;
+            let low = self.division.voxels_of_page(page).low;
             let is_here = low.cmpge(own.low).all() && low.cmplt(own.end).all();
-            let of = present.iter().position(|&present| present == channel).filter(|_| is_here)?;
-            let texels =
-                PageTexels::cut_out(volume.channels().nth(of)?, low - within.low, self.bits, self.pool.format());
+            let of = block.channels.iter().position(|&present| present == channel).filter(|_| is_here)?;
+            let texels = PageTexels::cut_out(
+                volume.channels().nth(of)?,
+                low - within.low,
+                self.division.bits,
+                self.pool.format(),
+            );
             Some(((channel, page), texels))
         };
-        Ok((block, all.into_iter().filter_map(texels).collect()))
+        let texels = needed.into_iter().filter_map(texels).collect();
+        Ok((block, texels))
     }
 
     /// The number of lists: one for each channel after splatting, else one for all.
@@ -405,8 +423,8 @@ impl<'a> Pages<'a> {
         closed: Option<&[bool]>,
     ) -> Result<(Content, Stats), RenderError> {
         while !self.hold(&pages)? {}
-        let from = low << self.bits;
-        let grid = self.grid().part(from, (across << self.bits).min(self.grid().dims - from));
+        let from = low << self.division.bits;
+        let grid = self.grid().part(from, (across << self.division.bits).min(self.grid().dims - from));
         let known = || drawn.iter().filter_map(|(at, number)| self.blocks.get(at).map(|block| (block, *number)));
         let open = match closed {
             Some(closed) => OpenPixels::new(window.region, closed.iter().map(|is_closed| !is_closed)),
@@ -432,7 +450,7 @@ impl<'a> Pages<'a> {
         let ahead = std::mem::take(&mut self.ahead);
         let of_thread = &*self;
         let draw = || of_thread.gpu.draw_pages(&volume, &of_thread.scene, window, closed);
-        let (drawn, read) = join(draw, || of_thread.read_all(ahead));
+        let (drawn, read) = join(draw, || of_thread.read_all(ahead.into_iter().map(|block| (block, ALL)).collect()));
         self.forget();
         self.take(read?)?;
         drawn
@@ -454,11 +472,11 @@ impl<'a> Pages<'a> {
 
     /// Reads a page of a channel; nothing if the format of values cannot store one.
     fn read_page(&self, (channel, page): ChannelPage) -> Result<Option<PageTexels>, RenderError> {
-        let within = self.voxels_of_page(page);
+        let within = self.division.voxels_of_page(page);
         let grid = self.grid().part(within.low, within.end - within.low);
         let of = self.chunks.channels().nth(channel);
         let volume = of.map_or_else(|| Ok(Volume::hollow(grid, &[])), |channel| channel.read_all(within, &grid))?;
-        Ok(PageTexels::cut_out(&volume, UVec3::ZERO, self.bits, self.pool.format()))
+        Ok(PageTexels::cut_out(&volume, UVec3::ZERO, self.division.bits, self.pool.format()))
     }
 
     /// Drops what is known of the blocks that were not used for the longest time, if all together take too much memory.
@@ -478,10 +496,4 @@ impl<'a> Pages<'a> {
             held -= self.blocks.remove(&at).map_or(0, |block| block.bytes);
         }
     }
-}
-
-/// The middle of a box of voxels, and half its size.
-fn bounds(VoxelBox { low, end }: VoxelBox) -> (DVec3, DVec3) {
-    let half = (end - low - 1).as_dvec3() / 2.0;
-    (low.as_dvec3() + half, half)
 }
