@@ -243,7 +243,7 @@ fn what_boxes_in_front_hide_is_not_drawn() {
 #[test]
 fn what_pages_hide_is_not_read() {
     let dims = UVec3::new(96, 36, 36);
-    let value = |index: u32| 200.0 - (index / 96 % 7) as f32;
+    let value = |index: u32| 200.0 - 8.0 * (index / 96 % 7) as f32;
     let volume = Volume::new("wall", dims, DVec3::ONE, (0..dims.element_product()).map(value).collect()).unwrap();
     let (_, scene) = head(
         8,
@@ -257,7 +257,7 @@ fn what_pages_hide_is_not_read() {
     let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
     let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(32)));
     let drawn = headless.render_volume(store::streamed(store.clone(), 0, &volume, 1 << 19), &scene).unwrap();
-    assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, [0.2, 0.4, 0.6, 0.5], 500), 40.0, "wall");
+    assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, "wall");
     let read = store.read.lock().unwrap();
     assert!(!read.is_empty() && read.iter().all(|low| low[0] < 64), "{read:?}");
 }

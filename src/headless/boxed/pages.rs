@@ -221,7 +221,7 @@ impl<'a> Pages<'a> {
         Ok(Some((slabs.start..end, within.map(|within| Paging { drawn, pages, within }))))
     }
 
-    /// The blocks of which open pixels may see something in some slabs, and nothing is known or something is drawn; each with the first slab in which it is seen.
+    /// The blocks of which open pixels may see something in some slabs, each with the first slab in which it is seen, without those that are known to show nothing there.
     fn seen_blocks(&self, (region, open): (&Region, &OpenPixels), slabs: Range<i32>) -> Vec<(i32, UVec3)> {
         let Some(VoxelBox { low, end }) = self.chunks.needed(region, &slabs) else { return Vec::new() };
         let (first, last) = (low / self.division.side, (end - 1) / self.division.side);
