@@ -42,7 +42,7 @@ impl Batch<'_> {
     }
 
     /// The sections of the next voxel without perspective.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn flat(&mut self, (first_plane, end): (f32, i32), sheet: i32) {
         let splat = &mut self.splats[self.count];
         (splat.first_plane, splat.step, splat.sheets) = (first_plane, self.flat_step, [sheet, end]);
@@ -68,7 +68,7 @@ impl Batch<'_> {
     }
 
     /// Adds the next voxel, whose sections are set, and whose amount is not known yet.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn add(&mut self, voxel: [u32; 2], center: [f32; 2], pixels: Pixels) {
         let splat = &mut self.splats[self.count];
         (splat.center, splat.pixels) = (center, pixels);

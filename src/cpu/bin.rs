@@ -64,7 +64,7 @@ pub(super) fn place(level: Level, bricks: &[Brick], projection: &Projection, sup
     let chunks = bricks.par_chunks(AT_A_TIME).zip(placed.par_chunks_mut(AT_A_TIME)).enumerate();
     chunks.for_each(|(chunk, (bricks, placed))| {
         dispatch!(level, simd => simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 for ((number, brick), placed) in (chunk * AT_A_TIME..).zip(bricks).zip(placed) {
                     *placed = place_brick(number as u32, brick, projection, support).unwrap_or(Placed::NOWHERE);
@@ -75,13 +75,13 @@ pub(super) fn place(level: Level, bricks: &[Brick], projection: &Projection, sup
 }
 
 /// Where a brick is; `None` off the image.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn place_brick(number: u32, brick: &Brick, projection: &Projection, support: f64) -> Option<Placed> {
     place_box(number, brick::bounds(brick), projection, support)
 }
 
 /// Where a box of voxels is, given by its middle and half its size; `None` off the image.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn place_box(
     number: u32,
     (middle, half): (DVec3, DVec3),

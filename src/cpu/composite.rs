@@ -27,7 +27,7 @@ pub(super) struct Compositor {
 impl Compositor {
     /// Composites a sheet that begins at `begin`, empties it, and finds the pixels that became opaque; the number of tiles
     /// as statistics count them (SPEC §8) in which there was anything to composite.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn composite<S: Simd>(
         &self,
         simd: S,
@@ -64,7 +64,7 @@ impl Compositor {
     }
 
     /// Composites eight pixels of a row, from a column on. Returns which of the row's pixels are now opaque, as bits; 0 if nothing is culled.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn vector<S: Simd>(
         &self,
         simd: S,
@@ -110,7 +110,7 @@ impl Compositor {
 
     /// Composites eight pixels. By means ([`Compositing`]): for the minimum the compositing buffer keeps 2 less the opacity, and 0 where
     /// nothing counted; for a surface that is not reached the mean of the last sheet.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn pixels<S: Simd>(&self, simd: S, acc: Pixels<S>, sheet: Pixels<S>) -> Pixels<S> {
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let sheet = match self.compositing {
@@ -141,7 +141,7 @@ impl Compositor {
     }
 
     /// Keeps a sheet where its opacity is larger, or equal and nearer. Opacities above 1 count as equal.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn kept<S: Simd>(&self, acc: Pixels<S>, sheet: Pixels<S>, opacity: f32x8<S>, one: f32x8<S>) -> Pixels<S> {
         let passes = match self.order {
             Order::FrontToBack => opacity.simd_gt(acc[3]),
@@ -153,7 +153,7 @@ impl Compositor {
     }
 
     /// Notes where the requested opacity is reached for pixels that reach it in this sheet, as `shaders/composite.wgsl` does.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn hit<S: Simd>(
         &self,
         simd: S,
@@ -183,23 +183,23 @@ fn tiles_of(rows: u64) -> u64 {
 }
 
 /// The length of the part of a stretch that lies in the slab beginning at `begin`.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn within_slab<S: Simd>(simd: S, [start, end]: [f32x8<S>; 2], begin: f32) -> [f32x8<S>; 2] {
     [start.max(f32x8::splat(simd, begin)), end.min(f32x8::splat(simd, begin + 1.0))]
 }
 
 /// Where between the middles of a slab and of the next one their means' opacity is one half, if it grows evenly.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn crossing<S: Simd>(before: f32x8<S>, mean: f32x8<S>) -> f32x8<S> {
     (0.5 - before) / (mean - before)
 }
 
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn scaled<S: Simd>([red, green, blue, alpha]: Pixels<S>, by: f32x8<S>) -> Pixels<S> {
     [red * by, green * by, blue * by, alpha * by]
 }
 
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn sum<S: Simd>(a: Pixels<S>, b: Pixels<S>) -> Pixels<S> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
 }

@@ -51,7 +51,7 @@ impl Drawn {
     }
 
     /// Adds what a tile has marked of a brick, given how many sections its voxels have.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn add(&self, brick: u32, marks: &[u64], sections: &BySlot<u32>, tally: &mut Tally) {
         let all = &self.marks[brick as usize * self.masks..][..self.masks];
         for (mask, (all, &marks)) in all.iter().zip(marks).enumerate() {

@@ -54,7 +54,7 @@ pub(super) struct Boxes {
 
 impl Boxes {
     /// As [`Pixels::within`].
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn within<S: Simd>(simd: S, centers: &[[f32; LANES]; 2], half: &[[f32; LANES]; 2]) -> Self {
         let [columns, rows] = [COLUMNS as f32, ROWS as f32];
         Self {
@@ -63,7 +63,7 @@ impl Boxes {
         }
     }
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn of_axis<S: Simd>(simd: S, centers: &[f32; LANES], half: &[f32; LANES], count: f32) -> [[i32; LANES]; 2] {
         let splat = |number: f32| f32x8::splat(simd, number);
         let (centers, half) = (f32x8::load_array_ref(simd, centers), f32x8::load_array_ref(simd, half));
@@ -73,7 +73,7 @@ impl Boxes {
     }
 
     /// Those of one box.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn pixels(&self, lane: usize) -> Option<Pixels> {
         let of = |axis: &[[i32; LANES]; 2]| [axis[0][lane] as usize, axis[1][lane] as usize];
         let is_any = self.columns[0][lane] <= self.columns[1][lane] && self.rows[0][lane] <= self.rows[1][lane];
@@ -82,7 +82,7 @@ impl Boxes {
 }
 
 /// The largest integer that is not above a small number, without the system's `floor` or a branch.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn floor(x: f32) -> i32 {
     // Adding 1.5·2²³ rounds to a whole number, which is then in the low bits.
     const MAGIC: f32 = 12_582_912.0;
@@ -127,7 +127,7 @@ impl OpenMask {
     }
 
     /// The bits of some open columns of a row, from one on; none behind the last row.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn bits(&self, row: usize, column: usize, count: usize) -> u64 {
         let bits = if row < ROWS { self.joined[0][row] } else { 0 };
         u64::from(bits >> column & !(u32::MAX << count))
@@ -139,7 +139,7 @@ impl OpenMask {
     }
 
     /// Notes open pixels of a row as opaque, which stay open until [`Self::close_found`].
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn find(&mut self, row: usize, opaque: u32) {
         let found = opaque & self.row(row);
         if found != 0 {
@@ -149,7 +149,7 @@ impl OpenMask {
     }
 
     /// Closes the pixels that were found to be opaque.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn close_found(&mut self) {
         if self.found_rows == 0 {
             return;
@@ -164,7 +164,7 @@ impl OpenMask {
     }
 
     /// Computes the joined rows again.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn join(&mut self) {
         for level in 1..LEVELS {
             let step = 1 << (level - 1);
@@ -190,7 +190,7 @@ impl OpenMask {
     }
 
     /// Whether any pixel of a box is open.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn sees(&self, pixels: &Pixels) -> bool {
         let Pixels { columns: [left, right], rows: [first, last] } = *pixels;
         let level = (last + 1 - first).ilog2() as usize;
@@ -200,7 +200,7 @@ impl OpenMask {
 }
 
 /// The bits of columns from one to another, both included.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn columns_between(first: usize, last: usize) -> u32 {
     u32::MAX << first & u32::MAX >> (COLUMNS - 1 - last)
 }

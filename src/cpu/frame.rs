@@ -254,7 +254,7 @@ impl<'a> Frame<'a> {
     }
 
     /// Draws a tile, including rows and columns outside the image.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn draw_tile<S: Simd>(
         &self,
         simd: S,
@@ -280,7 +280,7 @@ fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overla
     let depths = PlaceDepths::new(view);
     let of_chunk = |bricks: &[Brick]| {
         dispatch!(level, simd => simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let mut sum = Overlaps::default();
                 for brick in bricks {

@@ -47,21 +47,21 @@ impl KernelTables {
     }
 
     /// `H(0, 0, t)` of eq. 3, the kernel's integral along the ray through its centre, from the centre to t.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn along<S: Simd, V: SimdFloat<S, Element = f32>>(&self, simd: S, t: V) -> V {
         let t = t.max(V::splat(simd, -self.support)).min(V::splat(simd, self.support));
         t * self.cumulative_per_distance(t * t)
     }
 
     /// `H(0, 0, t)` where the chord of the kernel's ball ends.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn rim<S: Simd, V: SimdFloat<S, Element = f32>>(&self, simd: S, rho_squared: V) -> V {
         let chord_squared = (V::splat(simd, self.support_squared) - rho_squared).max(V::splat(simd, 0.0));
         chord_squared.sqrt() * self.cumulative_per_distance(chord_squared)
     }
 
     /// `H(0, 0, t) / t`, given t².
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn cumulative_per_distance<S: Simd, V: SimdFloat<S, Element = f32>>(&self, squared: V) -> V {
         let z = squared * self.scale - 1.0;
         match self.is_short {
@@ -71,7 +71,7 @@ impl KernelTables {
     }
 
     /// The Gaussian of ρ².
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn in_plane<S: Simd, V: SimdFloat<S, Element = f32>>(&self, simd: S, rho_squared: V) -> V {
         // Far from the voxel the rim is 0; the other factor must be finite.
         exp2(simd, (rho_squared * self.exponent).max(V::splat(simd, -126.0)))

@@ -47,7 +47,7 @@ impl Materials {
     }
 
     /// A voxel's materials in all channels, given by its slot.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn of_slot<'a>(&self, brick: &'a BrickMaterials, slot: u32) -> &'a [Material] {
         &brick[slot as usize * self.channels..][..self.channels]
     }

@@ -130,7 +130,7 @@ impl Projection {
     }
 
     /// The pixel coordinates of one of a brick's voxels in a tile, given the tile's [`Self::shift`].
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn center(&self, brick: Place, slot: u32, shift: [f64; 2]) -> [f32; 2] {
         let slot = slot as usize % BRICK_VOXELS as usize;
         let (x, y) = (brick.x + self.offsets.x[slot], brick.y + self.offsets.y[slot]);
@@ -145,7 +145,7 @@ impl Projection {
 
     /// The sections that a voxel without perspective has from a sheet on: the distance from the voxel to the plane where they begin, grid units along
     /// its ray, and the end of its range of sheets.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn flat_sections(&self, brick: Place, slot: u32, sheet: i32) -> (f32, i32) {
         let depth = brick.depth + self.offsets.depth[slot as usize % BRICK_VOXELS as usize];
         let reach = self.view.reach / self.view.slabs.width;
@@ -172,7 +172,7 @@ impl Projection {
     }
 
     /// The same in perspective, given the voxel's sheet depth in slabs and its depth from the eye. Without a branch, so that loops are vectorized.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn sheets_of_eye(
         &self,
         Perspective { eye, eye_voxel, is_image_aligned, .. }: &Perspective,
@@ -190,7 +190,7 @@ impl Projection {
     }
 
     /// The first sheets of a brick's voxels by slot, those of empty slots too where that is faster; [`NO_SHEET`] for none.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn first_sheets(&self, brick: &Brick, place: Place) -> BySlot<i32> {
         let mut first = [NO_SHEET; BRICK_VOXELS as usize];
         if self.view.perspective.is_none() {
@@ -222,7 +222,7 @@ impl Projection {
     }
 
     /// The starts and ends of [`Self::sheets`] of a brick's voxels in perspective, by slot; of empty slots any.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn in_perspective(&self, brick: &Brick, place: Place) -> [BySlot<i32>; 2] {
         let mut sheets = [[0; BRICK_VOXELS as usize]; 2];
         let Some(perspective) = &self.view.perspective else { return sheets };
@@ -238,7 +238,7 @@ impl Projection {
     }
 
     /// The number of sheets that each of a brick's voxels overlaps, by slot; of empty slots any number.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn sections(&self, brick: &Brick, place: Place) -> BySlot<u32> {
         let mut sections = [0; BRICK_VOXELS as usize];
         if self.view.perspective.is_some() {
@@ -260,14 +260,14 @@ impl Projection {
 
     /// Slabs between two depths by more than rounding errors ([`slab::ROUNDING`]), as sheets, up to the last that is composited; none if they end
     /// before the first.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn numbered(&self, first: f64, end: f64) -> Range<i32> {
         let Range { start, end } = self.unclipped(first, end);
         self.reaching(start, end)
     }
 
     /// The same of all sheets.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn unclipped(&self, first: f64, end: f64) -> Range<i32> {
         let (first, end) = (first_plane(first), end_plane(end));
         if self.direction > 0 { first..end } else { 1 - end..1 - first }
@@ -278,7 +278,7 @@ impl Projection {
         sheets.start >= self.window.start && sheets.end <= self.window.end
     }
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn reaching(&self, first: i32, end: i32) -> Range<i32> {
         first.max(self.least)..if end > self.window.start { end.min(self.window.end) } else { i32::MIN }
     }
@@ -365,13 +365,13 @@ fn principal_axis(difference: f64, product: f64) -> DVec2 {
 
 /// The last plane up to a depth and its rounding error ([`slab::ROUNDING`]), in slabs: the one nearest to half a slab before. Because of that error no depth lies in
 /// the middle between two planes.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn first_plane(depth: f64) -> i32 {
     nearest(depth + (slab::ROUNDING - 0.5))
 }
 
 /// The first plane from a depth less its rounding error on.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn end_plane(depth: f64) -> i32 {
     nearest(depth - (slab::ROUNDING - 0.5))
 }
@@ -380,13 +380,13 @@ fn end_plane(depth: f64) -> i32 {
 const MAGIC: f64 = 6_755_399_441_055_744.0;
 
 /// The nearest whole number.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn nearest(x: f64) -> i32 {
     (x + MAGIC).to_bits() as i32
 }
 
 /// The largest integer that is not above a number, without the system's `floor` or a branch.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn floor(x: f64) -> i32 {
     let rounded = (x + MAGIC) - MAGIC;
     let floored = rounded - f64::from(u8::from(rounded > x));

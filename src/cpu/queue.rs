@@ -44,7 +44,7 @@ impl Queue {
     }
 
     /// Lets voxels of a brick wait for their first sheets, given for all slots; those before the current sheet count as it.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn add<S: Simd>(&mut self, simd: S, waiting: Waiting, first_sheets: &BySlot<i32>, current: i32) {
         let Waiting { brick, voxels: mut left } = waiting;
         while left != 0 {
@@ -77,7 +77,7 @@ impl Queue {
 }
 
 /// The bits of the numbers that equal one.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn equal<S: Simd>(simd: S, numbers: &BySlot<i32>, to: i32) -> u64 {
     let to = i32x8::splat(simd, to);
     let mut bits = 0;

@@ -38,7 +38,7 @@ impl Reached {
 
     /// Lists the open pixels of a box that a footprint reaches. `footprint` tells of a vector of pixels, given by their offsets from its centre, which are
     /// reached, and numbers for them. It must be inlined, or its vectors would be computed by calls.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn list<S: Simd, V: SimdFloat<S, Element = f32>, const N: usize>(
         &mut self,
         simd: S,

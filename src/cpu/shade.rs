@@ -23,7 +23,7 @@ pub(super) struct Unshaded {
 
 impl Unshaded {
     /// Puts a voxel's material into a lane.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn set_material(&mut self, lane: usize, material: &Material) {
         self.alpha[lane] = material.alpha;
         for axis in 0..3 {
@@ -33,7 +33,7 @@ impl Unshaded {
     }
 
     /// Puts into a lane what depends on the view.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn set_view(&mut self, lane: usize, to_eye: DVec3, scale: f64) {
         self.scale[lane] = scale as f32;
         for axis in 0..3 {
@@ -73,7 +73,7 @@ impl Shader {
     }
 
     /// `(C·m, m)` times the scale of every lane's voxel.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn shade<S: Simd>(&self, simd: S, voxels: &Unshaded) -> [[f32; LANES]; 4] {
         let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
         let alpha = load(&voxels.alpha);
@@ -87,7 +87,7 @@ impl Shader {
     }
 
     /// The colours in this light. A normal of 0 stands for a voxel without a direction, which gets ambient light alone.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn color<S: Simd>(
         &self,
         simd: S,
@@ -106,7 +106,7 @@ impl Shader {
     }
 
     /// The diffuse and the specular term: two-sided, and 0 without a normal.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn lighting<S: Simd>(&self, simd: S, normal: [f32x8<S>; 3], to_eye: [f32x8<S>; 3]) -> (f32x8<S>, f32x8<S>) {
         let splat = |component: f32| f32x8::splat(simd, component);
         let to_light = match self.to_light {

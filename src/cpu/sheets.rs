@@ -88,7 +88,7 @@ impl Ring {
     }
 
     /// Records that pixels within a box were written to in some slots, from one on.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn mark(&mut self, columns: [usize; 2], rows: [usize; 2], slot: usize, count: usize) {
         let [first, last] = columns.map(|column| column / LANES);
         let vectors = ALL_VECTORS >> (VECTORS - 1 - last) & u32::MAX << first;
@@ -134,7 +134,7 @@ impl Sheet for OpenSheet<'_> {
         self.ring.written.iter().rev().fold(0, |rows, written| rows << 1 | u64::from(is_filled(written)))
     }
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn take<S: Simd>(&mut self, simd: S, row: usize, vector: usize) -> Option<[f32x8<S>; CHANNELS]> {
         let bit = 1 << (VECTORS * self.slot + vector);
         if self.ring.written[row] & bit == 0 {

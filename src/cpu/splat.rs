@@ -47,7 +47,7 @@ pub(super) struct Splat {
 
 impl Splat {
     /// The number of sections to be drawn next.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn sections(&self) -> usize {
         ((self.sheets[1] - self.sheets[0]) as usize).min(SECTIONS)
     }
@@ -103,7 +103,7 @@ struct LocalSections {
 }
 
 impl Footprint {
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn set_planes<S: Simd>(&mut self, simd: S, kernel: &KernelTables, [near, far]: [f32x8<S>; 2]) {
         let (near, far) = kernel.along(simd, near.combine(far)).split();
         (self.near, self.far) = (near.to_array(), far.to_array());
@@ -149,7 +149,7 @@ const ORDERS: [BySlot; RING] = {
 
 impl Splatter {
     /// Lists the open pixels of a tile that a splat's next sections reach, if there are any; the box that contains them.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn list<S: Simd>(
         &self,
         simd: S,
@@ -175,7 +175,7 @@ impl Splatter {
     }
 
     /// The planes of a splat's next sections without perspective, and its pixels.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn list_flat<S: Simd>(
         &self,
         simd: S,
@@ -196,7 +196,7 @@ impl Splatter {
             splat.center,
             pixels,
             open,
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             move |[dx, dy]: [S::f32s; 2]| {
                 let rho_squared = dx * (dx * xx + dy * xy) + dy * yy * dy;
                 (rho_squared.simd_lt(limit), [rho_squared])
@@ -205,7 +205,7 @@ impl Splatter {
     }
 
     /// The pixels of a splat's next sections in perspective.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn list_local<S: Simd>(
         &self,
         simd: S,
@@ -224,7 +224,7 @@ impl Splatter {
             splat.center,
             pixels,
             open,
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             move |[dx, dy]: [S::f32s; 2]| {
                 let (u, v) = (dx * x + dy * y, dx * -y + dy * x);
                 let (u, v) = (u * u, v * v);
@@ -234,7 +234,7 @@ impl Splatter {
     }
 
     /// The next sections of a splat in perspective, and the pixels that any of them reaches; `None` for no pixel of the tile.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn local_sections<S: Simd>(
         &self,
         simd: S,
@@ -272,7 +272,7 @@ impl Splatter {
     }
 
     /// Adds the listed footprints to the sheets, one after the other.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn add<S: Simd>(&self, simd: S, footprints: &mut Footprints, ring: &mut Ring) {
         let Footprints { reached, all, count } = &mut *footprints;
         if self.pixel_per_depth.is_none() {
@@ -291,7 +291,7 @@ impl Splatter {
     }
 
     /// Without perspective, what all sections have in common: replaces every listed pixel's ρ² by `H(0, 0, t)` at the rim and the Gaussian.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn weigh<S: Simd>(&self, simd: S, reached: &mut Reached) {
         let width = S::f32s::LEN;
         let [first, second] = &mut *reached.numbers;
@@ -304,7 +304,7 @@ impl Splatter {
     }
 
     /// In perspective: weights by section of a vector of pixels, then by pixel of all sections.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn add_local<S: Simd>(
         &self,
         simd: S,
@@ -341,7 +341,7 @@ impl Splatter {
 }
 
 /// Without perspective all sections have one footprint.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn add_flat<S: Simd>(simd: S, footprint: &Footprint, (reached, listed): (&Reached, Range<usize>), ring: &mut Ring) {
     let (near, far) = (f32x8::load_array_ref(simd, &footprint.near), f32x8::load_array_ref(simd, &footprint.far));
     let color = splatted(simd, footprint.color);
@@ -354,27 +354,27 @@ fn add_flat<S: Simd>(simd: S, footprint: &Footprint, (reached, listed): (&Reache
 }
 
 /// The number of a slot's weight in a vector, given a slot or one of the ring's next turn.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn lane_of(slot: usize) -> usize {
     const LANES_OF: [usize; 2 * RING] = [0, 1, 2, 4, 5, 6, 0, 1, 2, 4, 5, 6];
     LANES_OF[slot % (2 * RING)]
 }
 
 /// `H(0, 0, t)` at planes, or at the rim on their side.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn cut_by_rim<S: Simd, V: SimdFloat<S, Element = f32>>(planes: V, rim: V) -> V {
     planes.max(-rim).min(rim)
 }
 
 /// A colour for each of a vector's two slots.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn splatted<S: Simd>(simd: S, color: [f32; CHANNELS]) -> f32x8<S> {
     let color = f32x4::load_array(simd, color);
     color.combine(color)
 }
 
 /// Adds a colour to a pixel of all open sheets, by weights.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn add<S: Simd>(simd: S, weights: f32x8<S>, color: f32x8<S>, pixel: &mut PixelSums) {
     for (Sums(sums), bytes) in pixel.iter_mut().zip(&WEIGHT_OF_CHANNELS) {
         let weights = weights.swizzle_dyn_within_blocks(u8x32::load_array_ref(simd, bytes));

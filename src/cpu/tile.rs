@@ -50,7 +50,7 @@ struct Starts {
 }
 
 impl Starts {
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn add(&mut self, voxel: [u32; 2], center: [f32; 2], half_box: [f32; 2]) {
         let lane = self.count;
         self.voxels[lane] = voxel;
@@ -109,7 +109,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws a tile, given its first pixel and its bricks by first sheet: what its buffers hold then, and how its pixels look at sheets.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn draw<S: Simd>(
         &mut self,
         simd: S,
@@ -151,7 +151,7 @@ impl<'a> TileWalk<'a> {
         self.tally = Tally::default();
     }
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
         // Empty sheets are composited where they count.
         let Range { start, end } = self.frame.counted.clone();
@@ -199,7 +199,7 @@ impl<'a> TileWalk<'a> {
     fn composite<S: Simd>(&mut self, simd: S, sheet: i32) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let Self { frame, open, rays, ring, buffers, tally, .. } = self;
                 if sheet < frame.projection.window.start {
@@ -253,7 +253,7 @@ impl<'a> TileWalk<'a> {
             let chunk = arrived.chunk.take();
             let drawn = chunk.as_ref().map_or(&frame.drawn, |chunk| &**chunk.drawn());
             simd.vectorize(
-                #[cfg_attr(not(debug_assertions), inline(always))]
+                #[inline(always)]
                 || drawn.add(number, marks, &frame.projection.sections(&brick, place), tally),
             );
             marks.fill(0);
@@ -280,7 +280,7 @@ impl<'a> TileWalk<'a> {
         self.arrived.push(Arrived { chunk: chunk.cloned(), number: placed.brick, brick, place, half_box, end });
         self.marks.resize(self.arrived.len() * self.frame.drawn.masks, 0);
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let first_sheets = projection.first_sheets(&brick, place);
                 let waiting = Waiting { brick: number, voxels: brick::present(&brick) };
@@ -296,7 +296,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Lists the pixels of voxels that start or continue in a sheet.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn start<S: Simd>(&mut self, simd: S, sheet: i32) {
         let continued = std::mem::take(&mut self.continued[slot_of(sheet)]);
         self.pending -= continued.len();
@@ -325,7 +325,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws those of up to eight voxels that are seen, in batches.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn start_voxels<S: Simd>(&mut self, simd: S, starts: &mut Starts, sheet: i32, batch: &mut Batch<'a>) {
         let frame = self.frame;
         // In perspective these contain the boxes of all sections.
@@ -377,7 +377,7 @@ impl<'a> TileWalk<'a> {
     fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch<'_>) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let count = std::mem::take(&mut batch.count);
                 let mut amounts = [[0.0; LANES]; 4];
@@ -411,7 +411,7 @@ impl<'a> TileWalk<'a> {
     fn list_splat<S: Simd>(&mut self, simd: S, splat: &Splat) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let Self { frame, open, footprints, ring, .. } = &mut *self;
                 let [first, end] = splat.sheets;
@@ -445,7 +445,7 @@ impl<'a> TileWalk<'a> {
     /// Adds the footprints that are listed to the sheets.
     fn add_footprints<S: Simd>(&mut self, simd: S) {
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let Self { frame, footprints, ring, .. } = self;
                 frame.splatter.add(simd, footprints, ring);

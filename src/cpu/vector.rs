@@ -20,13 +20,13 @@ const EXP2: [f32; 6] =
 const ATANH: [f32; 5] = [1.0, 0.333_333_34, 0.200_001_92, 0.142_675_14, 0.118_084_05];
 
 /// 0, 1, …, 7.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn iota<S: Simd>(simd: S) -> f32x8<S> {
     f32x8::load_array(simd, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0])
 }
 
 /// Eight rows of four numbers, as four columns.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn columns<S: Simd>(simd: S, rows: [&[f32; 4]; LANES]) -> [f32x8<S>; 4] {
     let row = |at: usize| f32x4::load_array_ref(simd, rows[at]);
     let [a, b, c, d] = transposed([row(0), row(1), row(2), row(3)]);
@@ -35,14 +35,14 @@ pub(super) fn columns<S: Simd>(simd: S, rows: [&[f32; 4]; LANES]) -> [f32x8<S>; 
 }
 
 /// Four rows of four numbers, as four columns.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn transposed<S: Simd>([a, b, c, d]: [f32x4<S>; 4]) -> [f32x4<S>; 4] {
     let ([first, last], [second, third]) = ([a.zip_low(c), a.zip_high(c)], [b.zip_low(d), b.zip_high(d)]);
     [first.zip_low(second), first.zip_high(second), last.zip_low(third), last.zip_high(third)]
 }
 
 /// `2^x` as `2^n` and `2^f - 1`, with `x = n + f` and n whole, for x from -126 to 126.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn exp2_parts<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> (V, V) {
     // Adding 1.5·2²³ rounds to a whole number, which is then in the low bits.
     let magic = V::splat(simd, 12_582_912.0);
@@ -57,7 +57,7 @@ fn exp2_parts<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> (V, V) 
 }
 
 /// `2^x`, for x from -126 to 126.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn exp2<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V {
     let (power, less_one) = exp2_parts(simd, x);
     power + power * less_one
@@ -68,7 +68,7 @@ pub(super) fn exp2<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V 
 const LEAST_EXPONENT: f32 = -100.0;
 
 /// `(1 - exp(-x)) / x`, 1 at 0, for x from 0 on; to full relative precision.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn saturation<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
     // The square of this is a normal number, too.
     let x = x.max(f32x8::splat(simd, 1e-15));
@@ -79,7 +79,7 @@ pub(super) fn saturation<S: Simd>(simd: S, x: f32x8<S>) -> f32x8<S> {
 
 /// The exponent and `atanh((m - 1) / (m + 1))` of numbers above 0, whose mantissas m are from √½ to √2. `less_one` is the number less 1, more
 /// exactly than the number tells it.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn log_parts<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V, less_one: V) -> (V, V) {
     const ROOT_HALF: u32 = std::f32::consts::FRAC_1_SQRT_2.to_bits();
     // The bits of 2²³, in which a whole number's bits are the lowest ones.
@@ -100,14 +100,14 @@ fn log_parts<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V, less_one: V
 }
 
 /// `-ln(1 - x)` for x from 0 to 0.9999, to full relative precision: the optical depth per unit length for an opacity per unit length.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn optical_depth<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, x: V) -> V {
     let (exponent, atanh) = log_parts(simd, V::splat(simd, 1.0) - x, -x);
     exponent * -std::f32::consts::LN_2 - atanh * 2.0
 }
 
 /// `x^y` for x from 0 to about 1 and one y above 0; 0 at 0.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn power<S: Simd>(simd: S, x: f32x8<S>, y: f32) -> f32x8<S> {
     let is_zero = x.simd_eq(f32x8::splat(simd, 0.0));
     let base = x.max(f32x8::splat(simd, 1e-37));
@@ -119,13 +119,13 @@ pub(super) fn power<S: Simd>(simd: S, x: f32x8<S>, y: f32) -> f32x8<S> {
 
 /// The polynomial of 4 of 16 coefficients, given z and z².
 // No closure, which would not be compiled for the instruction set.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn cubic<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], at: usize, [z, squared]: [V; 2]) -> V {
     (z * c[at + 1] + c[at]) + squared * (z * c[at + 3] + c[at + 2])
 }
 
 /// A polynomial of 16 coefficients, the constant one first.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], z: V) -> V {
     let squared = z * z;
     let fourth = squared * squared;
@@ -134,7 +134,7 @@ pub(super) fn polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16],
 }
 
 /// The same without the last four coefficients.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn short_polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32; 16], z: V) -> V {
     let squared = z * z;
     let fourth = squared * squared;

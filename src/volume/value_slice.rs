@@ -158,7 +158,7 @@ impl<'a> ValueSlice<'a> {
 
     /// Some neighbouring values, from an index on.
     #[cfg(any(feature = "cpu", feature = "codecs", feature = "nifti"))]
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(crate) fn run<const N: usize>(self, first: usize) -> [f32; N] {
         for_type!(Self, self, values => numbers(values, first))
     }
@@ -242,7 +242,7 @@ impl ExactSizeIterator for ValueIter<'_> {}
 
 /// Some neighbouring numbers, from an index on, as `f32`.
 #[cfg(any(feature = "cpu", feature = "codecs", feature = "nifti"))]
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn numbers<T: Sample, const N: usize>(all: &[T], first: usize) -> [f32; N] {
     let some = &all[first..first + N];
     std::array::from_fn(|at| some[at].to_f32())

@@ -88,7 +88,7 @@ impl Cells {
     }
 
     /// Of eight points, given their cells, which those beyond the volume have in common with the nearest point inside.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn of(&self, indices: [u32; 8]) -> Bits {
         let cells = u64::from_le_bytes(indices.map(|index| self.bits[index as usize]));
         Bits { reaches: lowest_bits(cells / u64::from(REACHES)), stays: lowest_bits(cells / u64::from(STAYS)) }
@@ -96,7 +96,7 @@ impl Cells {
 }
 
 /// The lowest bits of eight bytes, that of the first one lowest.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn lowest_bits(bytes: u64) -> u32 {
     // The factor's bits move each of them to its place in the highest byte, where no two meet.
     ((bytes & 0x0101_0101_0101_0101).wrapping_mul(0x0102_0408_1020_4080) >> 56) as u32

@@ -45,13 +45,13 @@ impl<'a> Looks<'a> {
     }
 
     /// The stretches of eight pixels' rays that count.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn stretch<S: Simd>(&self, simd: S, [column, row]: [usize; 2]) -> [f32x8<S>; 2] {
         self.shown[row].each_ref().map(|ends| f32x8::from_slice(simd, &ends[column..column + LANES]))
     }
 
     /// Directions to the eye of eight pixels.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn to_eye<S: Simd>(&self, simd: S, frame: &Frame<'_>, [column, row]: [usize; 2]) -> [f32x8<S>; 3] {
         std::array::from_fn(|axis| match self.to_eye {
             None => f32x8::splat(simd, frame.to_eye[axis]),
@@ -70,7 +70,7 @@ impl<'a> Looks<'a> {
 
 impl Frame<'_> {
     /// Classifies the slab between two planes, into the sheet. The length of rays is left out.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     // The state of one tile, of which each is changed by itself.
     #[expect(clippy::too_many_arguments, reason = "the parts of a tile's state")]
     pub(super) fn classify<S: Simd>(
@@ -106,7 +106,7 @@ impl Frame<'_> {
     }
 
     /// Which of eight pixels' visible stretches reach into a slab.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn reaching<S: Simd>(&self, simd: S, lanes: u32, looks: &Looks<'_>, slab: i32, at: [usize; 2]) -> u32 {
         if lanes == 0 {
             return 0;
@@ -118,7 +118,7 @@ impl Frame<'_> {
     }
 
     /// For which of eight pixels values between those on a slab's two planes may have an opacity.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn showing<S: Simd>(&self, simd: S, lanes: u32, planes: &mut [Plane; 2], at: [usize; 2]) -> u32 {
         if lanes == 0 {
             return 0;
@@ -159,7 +159,7 @@ impl Frame<'_> {
         let values = &mut plane.rows[row].values;
         let Some(of) = &plane.points else { return values[column..column + LANES].fill(f32::NAN) };
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
                 let new = field.values(simd, of, [column, row], missing, &mut plane.weights);
@@ -179,7 +179,7 @@ impl Frame<'_> {
         let Some(of) = &plane.points else { return };
         let (PlaneRow { values, gradients }, weights) = (&mut plane.rows[row], &mut plane.weights);
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
                 let mut numbers = [0.0; LANES];
@@ -193,7 +193,7 @@ impl Frame<'_> {
     }
 
     /// The field of eight pixels in a slab; `None` if none of its values has an opacity.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn slab<S: Simd>(
         &self,
         simd: S,
@@ -219,7 +219,7 @@ impl Frame<'_> {
     }
 
     /// ∇f0 and ∇f1 of some of eight pixels in a slab.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn gradients<S: Simd>(
         &self,
         simd: S,
@@ -244,7 +244,7 @@ impl Frame<'_> {
     }
 
     /// What a slab adds to eight pixels, by channel; `None` if none of them shows anything.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn amounts<S: Simd>(
         &self,
         simd: S,
@@ -288,7 +288,7 @@ impl Frame<'_> {
     }
 
     /// Colours shaded by gradients.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn shaded<S: Simd>(
         &self,
         simd: S,
@@ -305,7 +305,7 @@ impl Frame<'_> {
     }
 
     /// The length of gradients, values per world unit.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn length<S: Simd>(&self, [x, y, z]: [f32x8<S>; 3]) -> [f64; LANES] {
         let lengths = (x * x + y * y + z * z).sqrt() * self.per_number;
         lengths.to_array().map(|length| f64::from(length) / self.field.gradient_length)
@@ -335,7 +335,7 @@ impl Frame<'_> {
 }
 
 /// Lanes by bits.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn mask<S: Simd>(simd: S, bits: u32) -> fearless_simd::mask32x8<S> {
     fearless_simd::mask32x8::from_bitmask(simd, bits.into())
 }

@@ -94,7 +94,7 @@ impl Frame<'_> {
     }
 
     /// The mean colours of some of eight pixels on the two planes of a slab, if voxels have colours of their own.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn slab_colors<S: Simd>(
         &self,
         simd: S,

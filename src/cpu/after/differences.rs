@@ -88,13 +88,13 @@ impl<'a> Neighbours<'a> {
     }
 
     /// The differences at a voxel, given its index too. At a border they are one-sided.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn at(&self, index: usize, voxel: UVec3) -> [f32; 3] {
         [self.along(index, voxel, 0), self.along(index, voxel, 1), self.along(index, voxel, 2)]
     }
 
     /// The difference along an axis.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn along(&self, index: usize, voxel: UVec3, axis: usize) -> f32 {
         let (has_before, has_after) = (voxel[axis] > 0, voxel[axis] + 1 < self.dims[axis]);
         let step = self.steps[axis];

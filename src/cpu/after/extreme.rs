@@ -102,7 +102,7 @@ pub(super) fn is_choice(compositing: Compositing) -> bool {
 }
 
 /// The position of the middle of a stretch: its slab, and the fraction of the slab before it.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
     let middle = (stretch[0] + stretch[1]) * 0.5;
     let slab = middle.floor();
@@ -111,7 +111,7 @@ fn middle_of<S: Simd>(stretch: [f32x8<S>; 2]) -> [f32x8<S>; 2] {
 
 impl Frame<'_> {
     /// Looks at the points of a slab's planes, as far as it has not yet.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn choose<S: Simd>(
         &self,
         simd: S,
@@ -136,7 +136,7 @@ impl Frame<'_> {
     }
 
     /// Looks at the points of some of eight pixels on a plane.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn choose_from<S: Simd>(
         &self,
         simd: S,
@@ -197,7 +197,7 @@ impl Frame<'_> {
     }
 
     /// Which of eight values are the ones to choose, so far.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn is_better<S: Simd>(&self, simd: S, kept: &Kept, column: usize, values: f32x8<S>) -> mask32x8<S> {
         let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[column..column + LANES]);
         let (number, weight) = (load(&kept.number), load(&kept.weight));
@@ -209,7 +209,7 @@ impl Frame<'_> {
     }
 
     /// Classifies what a tile's pixels chose, into the compositing buffer.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn classify_chosen<S: Simd>(&self, simd: S, looks: &Looks<'_>, chosen: &Chosen, buffers: &mut Buffers) {
         for (row, (best, middle)) in chosen.best.iter().zip(&chosen.middle).enumerate() {
             for column in (0..COLUMNS).step_by(LANES) {
@@ -218,7 +218,7 @@ impl Frame<'_> {
         }
     }
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn classify_group<S: Simd>(
         &self,
         simd: S,
@@ -302,7 +302,7 @@ impl Frame<'_> {
 
 impl Kept {
     /// Adds values where there is a bit.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn add<S: Simd>(&mut self, simd: S, column: usize, values: f32x8<S>, bits: u32) {
         for (row, new) in [(&mut self.number, values), (&mut self.weight, f32x8::splat(simd, 1.0))] {
             let old = f32x8::from_slice(simd, &row[column..column + LANES]);
@@ -312,7 +312,7 @@ impl Kept {
     }
 
     /// Puts numbers in where there is a bit.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn set<S: Simd>(
         &mut self,
         simd: S,

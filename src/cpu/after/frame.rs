@@ -285,7 +285,7 @@ impl<'a> Frame<'a> {
             let own = state(&self.drawn[(at.x + across.x * (at.y + across.y * at.z)) as usize]);
             let is_hidden = if own == 0 { around.map(state).max() == Some(WANTED) } else { own == WANTED };
             let sections = dispatch!(level, simd => simd.vectorize(
-                #[cfg_attr(not(debug_assertions), inline(always))]
+                #[inline(always)]
                 || self.placement.sections(simd, brick),
             ));
             [sections, if is_hidden { 0 } else { sections }]

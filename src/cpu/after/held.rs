@@ -41,7 +41,7 @@ impl Extent {
     }
 
     /// The index of one of the voxels in the box.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn index(&self, voxel: UVec3) -> usize {
         let [x, y, z] = (voxel - self.low).to_array().map(|n| n as usize);
         x + self.held.x as usize * (y + self.held.y as usize * z)

@@ -56,7 +56,7 @@ impl Placement {
     }
 
     /// The number of planes within a kernel's radius of each of a brick's voxels, in all.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn sections<S: Simd>(&self, simd: S, brick: &Brick) -> u64 {
         let row = self.view.screen_from_voxel[2];
         let first =

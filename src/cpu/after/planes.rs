@@ -49,14 +49,14 @@ impl Eight {
 
 impl Points {
     /// The point of a pixel.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn of(&self, column: usize, row: usize) -> DVec3 {
         self.first + self.right * column as f64 + self.down * row as f64
     }
 
     /// The points of eight pixels, their cells `before` voxels early, where the volume has at least `behind` voxels after them. A point that the
     /// voxels at hand do not surround has the index of some of them.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn eight<S: Simd>(
         &self,
         simd: S,

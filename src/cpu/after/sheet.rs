@@ -24,7 +24,7 @@ impl SlabSheet {
     }
 
     /// Adds a channel's amounts to eight pixels, from a column on.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn add<S: Simd>(&mut self, simd: S, [column, row]: [usize; 2], amounts: [f32x8<S>; CHANNELS]) {
         let vector = column / LANES;
         let is_first = self.written[row] >> vector & 1 == 0;
@@ -41,7 +41,7 @@ impl Sheet for SlabSheet {
         self.written.iter().rev().fold(0, |rows, &written| rows << 1 | u64::from(written != 0))
     }
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn take<S: Simd>(&mut self, simd: S, row: usize, vector: usize) -> Option<[f32x8<S>; CHANNELS]> {
         let bit = 1 << vector;
         let is_written = self.written[row] & bit != 0;

@@ -95,7 +95,7 @@ impl Table {
     }
 
     /// The cell of a number in the table's range, given its bin.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn cell_of(&self, x: f32, bin: i32) -> usize {
         let [mut first, mut last] = self.bins[bin as usize].map(|cell| cell as usize);
         while first < last {
@@ -108,7 +108,7 @@ impl Table {
 
 impl<S: Simd> Between<S> {
     /// Those from f0 to f1 in the lanes that have a bit, given their tables, which may all be the same.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn new(simd: S, [f0, f1]: [f32x8<S>; 2], lanes: u32, tables: &[&Table; LANES], are_same: bool) -> Self {
         let of = |number: fn(&Covered) -> f32| match are_same {
             true => f32x8::splat(simd, number(&tables[0].covered)),
@@ -129,7 +129,7 @@ impl<S: Simd> Between<S> {
 }
 
 /// Every number that lies in its range as it is. One below the range, or NaN, becomes the range's least number, and one above it the greatest.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn within<S: Simd>(x: f32x8<S>, [least, greatest]: [f32x8<S>; 2]) -> f32x8<S> {
     let at_least = x.simd_gt(least).select(x, least);
     at_least.simd_gt(greatest).select(greatest, at_least)
@@ -138,7 +138,7 @@ fn within<S: Simd>(x: f32x8<S>, [least, greatest]: [f32x8<S>; 2]) -> f32x8<S> {
 impl<'a> Parts<'a> {
     const NONE: Self = Self { cells: [&EMPTY; LANES], from: [0.0; LANES], to: [0.0; LANES], weight: [0.0; LANES] };
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn set(&mut self, lane: usize, cell: &'a Cell, [from, to]: [f32; 2], weight: f32) {
         self.cells[lane] = cell;
         self.from[lane] = from;
@@ -147,7 +147,7 @@ impl<'a> Parts<'a> {
     }
 
     /// The numbers of an entry of the cells, by lane.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn entry<S: Simd>(&self, simd: S, entry: usize) -> [f32x8<S>; 4] {
         let [a, b, c, d, e, f, g, h] = self.cells;
         columns(simd, [&a[entry], &b[entry], &c[entry], &d[entry], &e[entry], &f[entry], &g[entry], &h[entry]])
@@ -180,7 +180,7 @@ impl Integrals {
     }
 
     /// The means of the lanes that have a bit, given the table of each.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn means<'a, S: Simd>(
         &self,
         simd: S,
@@ -247,7 +247,7 @@ impl Integrals {
     }
 
     /// The sums over parts of cells, by two Gauss nodes.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn part<S: Simd>(&self, simd: S, parts: &Parts<'_>, low: f32x8<S>) -> Sums<S> {
         let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
@@ -276,7 +276,7 @@ impl Integrals {
     }
 
     /// m of SPEC §5.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn amount<S: Simd>(&self, simd: S, alpha: f32x16<S>) -> f32x16<S> {
         match self.is_optical_depth {
             true => optical_depth(simd, alpha.min(f32x16::splat(simd, 0.9999))),

@@ -34,7 +34,7 @@ struct Line<'a> {
 
 impl Frame<'_> {
     /// Looks for the surfaces of eight pixels in a slab; which of them have one.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn find_surfaces<S: Simd>(
         &self,
         simd: S,

@@ -84,7 +84,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Draws a tile, given its first pixel and its bricks by first slab. Returns its filled buffers and how its rays meet slabs.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn draw<S: Simd>(
         &mut self,
         simd: S,
@@ -129,7 +129,7 @@ impl<'a> TileWalk<'a> {
         }
     }
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn walk<'b, S: Simd>(&mut self, simd: S, first: i32, bricks: &mut Peekable<impl Iterator<Item = &'b Placed>>) {
         let mut slab = first;
         // The bricks that come next.
@@ -218,7 +218,7 @@ impl<'a> TileWalk<'a> {
     }
 
     /// Classifies and composites a slab.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
         let Self { frame, open, rays, to_eye, sheet, buffers, tally, channels, chosen, .. } = self;
         let looks = Looks::new(self.origin, rays, to_eye);

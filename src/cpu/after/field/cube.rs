@@ -71,7 +71,7 @@ impl Weights {
     }
 
     /// Computes those of the points that have a bit, and returns `Σ (c - base)·g` of each as four numbers to be added. Not finite if a hole is near.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn find<S: Simd>(
         &mut self,
         simd: S,
@@ -123,26 +123,26 @@ impl Weights {
     }
 
     /// N by point.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn totals<S: Simd>(&self, simd: S) -> f32x8<S> {
         f32x8::load_array_ref(simd, &self.totals)
     }
 
     /// g of the voxels of one z around a point.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn plane<S: Simd>(&self, simd: S, lane: usize, z: usize) -> f32x16<S> {
         f32x16::load_array_ref(simd, &self.planes[lane][z])
     }
 
     /// g of a row of voxels along x.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn row<S: Simd>(&self, simd: S, lane: usize, row: usize) -> f32x4<S> {
         let (plane, first) = (&self.planes[lane][row / SIDE], row % SIDE * SIDE);
         f32x4::from_slice(simd, &plane[first..first + SIDE])
     }
 
     /// A point's cube.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn cube(&self, lane: usize) -> Cube {
         let Eight { cells: [x, y, z], indices, .. } = &self.cubes;
         let first = UVec3::new(x[lane] as u32, y[lane] as u32, z[lane] as u32);
@@ -159,7 +159,7 @@ struct Cube {
 }
 
 /// δ along x and y of sixteen voxels around one of eight points.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn offsets<S: Simd>(simd: S, Eight { rest, .. }: &Eight, lane: usize) -> [f32x16<S>; 2] {
     let of = |axis: usize| f32x16::splat(simd, rest[axis][lane]) - f32x16::load_array(simd, OFFSETS[axis]);
     [of(0), of(1)]
@@ -167,7 +167,7 @@ fn offsets<S: Simd>(simd: S, Eight { rest, .. }: &Eight, lane: usize) -> [f32x16
 
 impl Field<'_> {
     /// `2·Σ d·g` of a point. Not finite if a hole is near.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn cube_differences<S: Simd>(&self, simd: S, weights: &Weights, lane: usize) -> f32x4<S> {
         match self.differences {
             #[cfg(not(target_arch = "wasm32"))]
@@ -178,7 +178,7 @@ impl Field<'_> {
     }
 
     /// The same of differences that are kept: x, y and z of a row's four voxels side by side.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn kept_differences<S: Simd, T: Sample>(&self, simd: S, weights: &Weights, lane: usize, all: &[T]) -> f32x4<S> {
         let mut sums = f32x16::splat(simd, 0.0);
         for (row, index) in self.rows_of(&weights.cube(lane)).into_iter().enumerate() {
@@ -189,7 +189,7 @@ impl Field<'_> {
     }
 
     /// The same sums of the same numbers, where differences are not kept.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn new_differences<S: Simd>(&self, simd: S, weights: &Weights, lane: usize) -> f32x4<S> {
         let cube = weights.cube(lane);
         let (values, dims, [step_y, step_z]) = (self.volume.values(), self.extent.dims, self.steps());
@@ -218,7 +218,7 @@ impl Field<'_> {
     }
 
     /// The indices of the first voxels of a cube's rows along x.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn rows_of(&self, cube: &Cube) -> [usize; SIDE * SIDE] {
         let [step_y, step_z] = self.steps();
         let mut rows = [0; SIDE * SIDE];
@@ -231,7 +231,7 @@ impl Field<'_> {
     }
 
     /// `Σ (c - f)·g·δ` of one of eight points, given f.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn cube_moments<S: Simd>(&self, simd: S, weights: &Weights, lane: usize, number: f32) -> [f32; 3] {
         let [step_y, step_z] = self.steps();
         let first = weights.cube(lane).index;
@@ -249,7 +249,7 @@ impl Field<'_> {
     }
 
     /// Steps in memory along y and z.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn steps(&self) -> [usize; 2] {
         let [x, y, _] = self.volume.dims().to_array().map(|n| n as usize);
         [x, x * y]
@@ -257,7 +257,7 @@ impl Field<'_> {
 }
 
 /// The number of each of a row's four voxels for each of their three differences.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn by_difference<S: Simd>(simd: S, four: f32x4<S>) -> f32x16<S> {
     const BYTES: [u8; 64] = {
         let mut bytes = [0; 64];
@@ -274,7 +274,7 @@ fn by_difference<S: Simd>(simd: S, four: f32x4<S>) -> f32x16<S> {
 }
 
 /// The differences of four voxels along x, given the index of the first one, and four numbers more.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn four_differences<S: Simd, T: Sample>(simd: S, all: &[T], index: usize) -> f32x16<S> {
     let mut numbers = [0.0; 16];
     numbers
@@ -285,19 +285,19 @@ fn four_differences<S: Simd, T: Sample>(simd: S, all: &[T], index: usize) -> f32
 }
 
 /// The Gaussian by its exponent of 2.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn gaussian<S: Simd, V: SimdFloat<S, Element = f32>>(simd: S, exponent: V) -> V {
     exp2(simd, exponent.max(V::splat(simd, -126.0)))
 }
 
 /// Four rows of four voxels, given the index of the first one and the step from row to row.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn rows<S: Simd>(simd: S, all: ValueSlice<'_>, at: usize, step: usize) -> f32x16<S> {
     f32x16::load_array(simd, for_type!(ValueSlice, all, all => side_by_side(all, at, step)))
 }
 
 /// Their numbers, side by side before they are converted, so that one instruction converts as many as there are lanes.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn side_by_side<T: Sample>(all: &[T], at: usize, step: usize) -> [f32; SIDE * SIDE] {
     let row = |at: usize| {
         let row = &all[at..at + SIDE];
@@ -309,7 +309,7 @@ fn side_by_side<T: Sample>(all: &[T], at: usize, step: usize) -> [f32; SIDE * SI
 }
 
 /// The sums of four voxels' x, y and z, which lie side by side, and some number.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn of_voxels<S: Simd>(simd: S, numbers: f32x16<S>) -> f32x4<S> {
     let numbers = numbers.to_array();
     let voxel = |at: usize| f32x4::from_slice(simd, &numbers[3 * at..3 * at + 4]);
@@ -317,7 +317,7 @@ fn of_voxels<S: Simd>(simd: S, numbers: f32x16<S>) -> f32x4<S> {
 }
 
 /// Four sums of four of sixteen numbers each.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn quarters<S: Simd>(numbers: f32x16<S>) -> f32x4<S> {
     let (low, high) = numbers.split();
     let (low, high) = (low + high).split();
@@ -325,14 +325,14 @@ fn quarters<S: Simd>(numbers: f32x16<S>) -> f32x4<S> {
 }
 
 /// The sum of sixteen numbers, in the same order on every machine.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn sum_of<S: Simd>(numbers: f32x16<S>) -> f32 {
     let [a, b, c, d] = quarters(numbers).to_array();
     (a + c) + (b + d)
 }
 
 /// The sums of four numbers for each of eight points, in that order.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 pub(super) fn sums_of<S: Simd>(simd: S, [a, b, c, d, e, f, g, h]: &[[f32; SIDE]; LANES]) -> f32x8<S> {
     let [first, second, third, fourth] = columns(simd, [a, b, c, d, e, f, g, h]);
     (first + third) + (second + fourth)

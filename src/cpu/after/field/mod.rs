@@ -110,7 +110,7 @@ impl<'a> Field<'a> {
     }
 
     /// The field of other voxels of the same volume.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn of<'b>(&self, held: &'b Held) -> Field<'b> {
         let volume = &held.volume;
         Field { volume, extent: held.extent, coefficients: volume.values(), colors: None, differences: None, ..*self }
@@ -143,7 +143,7 @@ impl<'a> Field<'a> {
     /// kernel does not reach have no weight. Returns what [`Weights::find`] does; `None` if kernels reach beyond cubes.
     // Twice in a program, which is faster, but once in a page, whose code must be short.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
-    #[cfg_attr(not(any(target_arch = "wasm32", debug_assertions)), inline(always))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn find_weights<S: Simd>(
         &self,
         simd: S,
@@ -160,7 +160,7 @@ impl<'a> Field<'a> {
     }
 
     /// f, as numbers, at those of eight points of a plane that have a bit; NaN where there is no value. `weights` are those that the plane keeps.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn values<S: Simd>(
         &self,
         simd: S,
@@ -187,7 +187,7 @@ impl<'a> Field<'a> {
     }
 
     /// ∇f in numbers per world unit, by component, at those of eight points of a plane that have a bit, given their f as numbers.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     pub(super) fn gradients<S: Simd>(
         &self,
         simd: S,
@@ -224,7 +224,7 @@ impl<'a> Field<'a> {
     }
 
     /// `Σ d·g / N` of the points that have a bit.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn cubes_differences<S: Simd>(&self, simd: S, weights: &Weights, lanes: u32) -> [[f32; LANES]; 3] {
         let mut sums = [[0.0; cube::SIDE]; LANES];
         for lane in bits(lanes.into()) {
@@ -238,7 +238,7 @@ impl<'a> Field<'a> {
     }
 
     /// The kernel's gradients of the points that have a bit.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn cubes_moments<S: Simd>(
         &self,
         simd: S,
@@ -259,7 +259,7 @@ impl<'a> Field<'a> {
 
     /// The kernel's gradient for `Σ (c - f)·g·δ / N`. Differences from f, because where all coefficients are equal it is then no more than the
     /// rounding error of f.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn kernel_gradient(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
         if x * x + y * y + z * z < self.min_moment {
             return [0.0; 3];

@@ -43,7 +43,7 @@ struct Sums<S: Simd> {
 
 impl Row {
     /// Eight voxels, from one on.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn lanes<S: Simd>(&self, simd: S, field: &Field<'_>, from: usize) -> Lanes<S> {
         let number = iota(simd) + from as f32;
         let offset = |axis: usize| number * self.step[axis] + self.offset[axis];
@@ -63,10 +63,10 @@ impl Row {
 
 impl Field<'_> {
     /// f at a point, as a number; NaN where there is no value.
-    #[cfg_attr(not(debug_assertions), inline(never))]
+    #[inline(never)]
     pub(super) fn row_value<S: Simd>(&self, simd: S, at: DVec3, low_pass: &LowPass) -> f32 {
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 if self.coefficients.at(self.nearest(at)).is_nan() {
                     return f32::NAN;
@@ -90,11 +90,11 @@ impl Field<'_> {
     }
 
     /// The colour and A at a point that has a value, in [0, 1]; black without colours.
-    #[cfg_attr(not(debug_assertions), inline(never))]
+    #[inline(never)]
     pub(in crate::cpu::after) fn color<S: Simd>(&self, simd: S, (at, low_pass): (DVec3, &LowPass)) -> Color {
         let Some(colors) = self.colors else { return [0.0; 4] };
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let (mut weights, mut sums) = (0.0, f32x4::splat(simd, 0.0));
                 for row in self.rows(at, low_pass) {
@@ -115,10 +115,10 @@ impl Field<'_> {
     }
 
     /// `Σ (c - f)·g·δ / N`, with f as a number.
-    #[cfg_attr(not(debug_assertions), inline(never))]
+    #[inline(never)]
     pub(super) fn row_moments<S: Simd>(&self, simd: S, at: DVec3, low_pass: &LowPass, number: f32) -> [f32; 3] {
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let zero = f32x8::splat(simd, 0.0);
                 let mut sums = Sums { weights: zero, sums: [zero; 3] };
@@ -138,10 +138,10 @@ impl Field<'_> {
     }
 
     /// `Σ d·g / N`.
-    #[cfg_attr(not(debug_assertions), inline(never))]
+    #[inline(never)]
     pub(super) fn row_differences<S: Simd>(&self, simd: S, at: DVec3, low_pass: &LowPass) -> [f32; 3] {
         simd.vectorize(
-            #[cfg_attr(not(debug_assertions), inline(always))]
+            #[inline(always)]
             || {
                 let zero = f32x8::splat(simd, 0.0);
                 let mut sums = Sums { weights: zero, sums: [zero; 3] };
@@ -162,7 +162,7 @@ impl Field<'_> {
     }
 
     /// d of eight voxels of a row, times the spacing, 0 where their weights are.
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn differences<S: Simd>(&self, simd: S, row: &Row, from: usize, weights: f32x8<S>) -> [f32x8<S>; 3] {
         let zero = f32x8::splat(simd, 0.0);
         let is_weighted = weights.simd_gt(zero);
@@ -233,7 +233,7 @@ impl Field<'_> {
 }
 
 impl<S: Simd> Sums<S> {
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn add(&mut self, weights: f32x8<S>, factors: [f32x8<S>; 3], numbers: [f32x8<S>; 3]) {
         self.weights += weights;
         for ((sum, factor), number) in self.sums.iter_mut().zip(factors).zip(numbers) {
@@ -241,7 +241,7 @@ impl<S: Simd> Sums<S> {
         }
     }
 
-    #[cfg_attr(not(debug_assertions), inline(always))]
+    #[inline(always)]
     fn means(&self) -> [f32; 3] {
         let per_weight = 1.0 / sum_of(self.weights);
         let [x, y, z] = self.sums;
@@ -251,13 +251,13 @@ impl<S: Simd> Sums<S> {
 
 /// The differences of eight voxels, from one on, over a step in memory to either side, times a factor.
 // No closure, which would not be compiled for the instruction set.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn across<S: Simd>(simd: S, values: ValueSlice<'_>, at: usize, step: usize, factor: f32x8<S>) -> f32x8<S> {
     load(simd, values, at + step) * factor - load(simd, values, at - step) * factor
 }
 
 /// Eight numbers, from one on; NaN beyond the last one.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn load<S: Simd>(simd: S, all: ValueSlice<'_>, at: usize) -> f32x8<S> {
     let count = all.len();
     if at + LANES <= count {
@@ -269,7 +269,7 @@ fn load<S: Simd>(simd: S, all: ValueSlice<'_>, at: usize) -> f32x8<S> {
 }
 
 /// The sum of eight numbers, in the same order on every machine.
-#[cfg_attr(not(debug_assertions), inline(always))]
+#[inline(always)]
 fn sum_of<S: Simd>(numbers: f32x8<S>) -> f32 {
     let (low, high) = numbers.split();
     let [a, b, c, d] = (low + high).to_array();
