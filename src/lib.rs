@@ -116,7 +116,6 @@ pub mod headless;
 pub mod image;
 mod kernel;
 mod lists;
-mod parallel;
 pub mod part;
 #[cfg(feature = "gpu")]
 mod pass;
@@ -132,11 +131,12 @@ pub mod settings;
 pub mod stats;
 pub mod volume;
 
+use sheetsplat_volume::internals::parallel;
+
 pub use error::RenderError;
 #[cfg(feature = "gpu")]
 pub use error::device::DeviceFault;
 pub use error::device::{DeviceError, InsufficientLimit};
-pub use error::setting::SettingError;
 #[cfg(feature = "gpu")]
 pub use geometry::surfaces::{SurfaceDepths, Surfaces};
 #[cfg(feature = "gpu")]
@@ -162,6 +162,7 @@ pub use renderer::pick::PendingPick;
 pub use renderer::scene_view::{Prepared, SceneView};
 pub use scene::Scene;
 pub use settings::Camera;
+pub use sheetsplat_volume::SettingError;
 pub use stats::Stats;
 pub use volume::Volume;
 // The libraries whose types stand in this one's signatures.

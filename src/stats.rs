@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+pub use sheetsplat_volume::StoreCounts;
+
 /// Milliseconds per stage.
 pub type StageTimes = BTreeMap<&'static str, f64>;
 
@@ -75,27 +77,6 @@ pub struct Counts {
     pub bricks_tested: u64,
     /// Bricks whose voxels were visited; by the tile rasterizer again for every tile and group.
     pub bricks_visited: u64,
-}
-
-/// What is read of a store for a frame, or for a volume that is read as a whole (SPEC §13).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-#[non_exhaustive]
-pub struct StoreCounts {
-    /// The level that was drawn; 0 is the finest.
-    pub level: u64,
-    /// The chunks of the level, in all channels that are read.
-    pub chunks_total: u64,
-    /// Those of them that were read. Each counts once, although it may have been read again.
-    pub chunks_read: u64,
-    /// The bytes of the store that reading them took, without those of reading again what was dropped.
-    pub bytes_read: u64,
-    /// The most bytes of values and bricks that were in memory at a time. It depends on the order in which threads draw. For a volume that is read as a
-    /// whole, the bytes of its values.
-    pub chunk_bytes: u64,
-    /// The chunks that were read for the sample of a volume that is streamed.
-    pub sample_chunks_read: u64,
-    /// Their bytes in the store.
-    pub sample_bytes_read: u64,
 }
 
 impl Counts {

@@ -1,16 +1,16 @@
 //! Errors of the renderer, and of volumes. Those of scenes are defined beside them; [`headless`](crate::headless) unites them all.
 
 pub(crate) mod device;
-pub(crate) mod setting;
-pub(crate) mod volume;
+
+pub(crate) use sheetsplat_volume::internals::setting;
 
 #[cfg(feature = "gpu")]
 use wgpu::Device;
 
+use crate::volume::VolumeError;
 #[cfg(feature = "gpu")]
 use device::DeviceFault;
 use setting::SettingError;
-use volume::VolumeError;
 
 /// Why a frame could not be prepared or read back.
 #[derive(Debug, thiserror::Error)]

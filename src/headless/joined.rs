@@ -90,7 +90,7 @@ fn each_channel(
     let store = match volume {
         OpenVolume::Whole(volume) => volume.reads(),
         OpenVolume::Streamed(volume) => {
-            let store = StoreCounts { level: volume.level() as u64, chunks_total: volume.chunks(), ..store };
+            (store.level, store.chunks_total) = (volume.level() as u64, volume.chunks());
             Some(volume.with_sample(store))
         }
     };

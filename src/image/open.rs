@@ -140,9 +140,9 @@ pub(crate) fn read(path: &Path, access: &Access) -> Result<Vec<u8>, ImageError> 
 
 /// The image error for an error of the volume reader.
 pub(crate) fn of_volume(error: VolumeError) -> ImageError {
-    match error {
-        VolumeError::Io { path, source, .. } => ImageError::Io { path, source },
-        VolumeError::Invalid { origin, field, found, allowed } => content(Path::new(&origin), &field, found, allowed),
+    match error.into_parts() {
+        Ok((path, source)) => ImageError::Io { path, source },
+        Err([origin, field, found, allowed]) => content(Path::new(&origin), &field, found, allowed),
     }
 }
 

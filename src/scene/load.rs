@@ -127,12 +127,12 @@ pub(super) fn origin(source: &VolumeSource) -> String {
 fn single(count: usize, number: usize, settings: &Channel) -> Result<(), VolumeError> {
     match count {
         1 => Ok(()),
-        _ => Err(VolumeError::Invalid {
-            origin: origin(&settings.volume),
-            field: format!("channel[{number}].volume"),
-            found: format!("a volume of {count} channels"),
-            allowed: "volumes of one channel, where several channels name volumes".to_owned(),
-        }),
+        _ => Err(VolumeError::invalid(
+            origin(&settings.volume),
+            format!("channel[{number}].volume"),
+            format!("a volume of {count} channels"),
+            "volumes of one channel, where several channels name volumes".to_owned(),
+        )),
     }
 }
 
@@ -142,12 +142,12 @@ fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, Vol
     let volume = match &settings.volume {
         VolumeSource::File(path) => Volume::read(path, &access.selecting(selection))?,
         VolumeSource::Raw(..) | VolumeSource::Builtin(_) if selection != Selection::default() => {
-            return Err(VolumeError::Invalid {
-                origin: origin(&settings.volume),
-                field: key.to_owned(),
-                found: "index, time or level of a volume without channels, times or levels to choose from".to_owned(),
-                allowed: "none of these keys, or a file of several channels, times or levels".to_owned(),
-            });
+            return Err(VolumeError::invalid(
+                origin(&settings.volume),
+                key.to_owned(),
+                "index, time or level of a volume without channels, times or levels to choose from".to_owned(),
+                "none of these keys, or a file of several channels, times or levels".to_owned(),
+            ));
         }
         VolumeSource::Raw(path, layout) => Volume::read_raw(path, layout, access)?,
         VolumeSource::Builtin(name) => builtin::read(name, access)?,
@@ -169,10 +169,10 @@ fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, Vol
 
 /// The error for a volume that no scene can name.
 fn in_memory(key: &str) -> VolumeError {
-    VolumeError::Invalid {
-        origin: "scene".to_owned(),
-        field: key.to_owned(),
-        found: "a volume in memory".to_owned(),
-        allowed: format!("{key}.path or {key}.builtin"),
-    }
+    VolumeError::invalid(
+        "scene".to_owned(),
+        key.to_owned(),
+        "a volume in memory".to_owned(),
+        format!("{key}.path or {key}.builtin"),
+    )
 }

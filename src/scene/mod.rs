@@ -72,11 +72,9 @@ pub enum SceneError {
 
 impl From<VolumeError> for SceneError {
     fn from(error: VolumeError) -> Self {
-        match error {
-            VolumeError::Io { path, source } => Self::Io { path, source },
-            VolumeError::Invalid { origin, field, found, allowed } => {
-                Self::Invalid { origin, key: field, found, allowed: allowed.into() }
-            }
+        match error.into_parts() {
+            Ok((path, source)) => Self::Io { path, source },
+            Err([origin, key, found, allowed]) => Self::Invalid { origin, key, found, allowed: allowed.into() },
         }
     }
 }

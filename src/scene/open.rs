@@ -166,7 +166,7 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
         return Ok(None);
     }
     if let Some(path) = &options.index {
-        let text = access.text(path)?.map_err(|source| VolumeError::Io { path: path.clone(), source })?;
+        let text = access.text(path)?.map_err(|source| VolumeError::io(path, source))?;
         let origin = path.display().to_string();
         StreamedVolume::index((&mut first, &mut further), StoreIndex::decode(&origin, &text)?, &origin)?;
     }

@@ -49,7 +49,7 @@ impl Origins<'_> {
 
     /// The error for settings that their type's check refused, quoting the value as written.
     pub(super) fn refused(&self, error: SettingError) -> SceneError {
-        let SettingError { key, found, allowed } = error;
+        let SettingError { key, found, allowed, .. } = error;
         let related: &[&str] = match &key[..] {
             "camera.up" => &["camera.direction"],
             "splatting.compositing" => &["preset", "splatting.method", "splatting.order"],

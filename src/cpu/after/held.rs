@@ -92,7 +92,7 @@ impl Frame<'_> {
         let half_box = self.placement.geometry.widest_half_box(&self.placement.view);
         let extent = self.extent(&slabs, origin, open, half_box);
         let nothing = |missing| {
-            let volume = Volume::piece(Grid { dims: UVec3::ZERO, ..self.grid }, Values::default());
+            let volume = Volume::piece(self.grid.resized(UVec3::ZERO), Values::default());
             Some(Held { slabs: slabs.clone(), extent, volume, cells: None, is_blank: true, missing })
         };
         if stream.range((extent.low, extent.held)).is_some_and(|range| self.is_dark(range)) {
@@ -107,7 +107,7 @@ impl Frame<'_> {
         }
         let values = stream.values((extent.low, extent.held), &seen);
         let is_blank = shown.is_some_and(|shown| !may_show((&values).into(), &self.numbers, shown));
-        let grid = Grid { dims: extent.held, ..self.grid };
+        let grid = self.grid.resized(extent.held);
         let cells = shown.filter(|_| !is_blank);
         let cells = cells.map(|shown| Cells::new(&grid, (&values).into(), &self.numbers, half_box, shown, Work::Alone));
         Some(Held { slabs, extent, volume: Volume::piece(grid, values), cells, is_blank, missing })

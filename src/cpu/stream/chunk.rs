@@ -11,7 +11,7 @@ use crate::cpu::count::Drawn;
 use crate::lists::brick::{self, Brick, BrickList};
 use crate::lists::classify::TakingPart;
 use crate::lists::quad_plan::Overlaps;
-use crate::volume::{Grid, Volume, VolumeError};
+use crate::volume::{Volume, VolumeError};
 
 /// A chunk that has been read.
 #[derive(Debug)]
@@ -48,7 +48,7 @@ impl Chunk {
             true => {
                 let (values, read) = source.values(low, dims)?;
                 source.note(number, &values);
-                (Some(Volume::piece(Grid { dims, ..source.grid }, values)), read)
+                (Some(Volume::piece(source.grid.resized(dims), values)), read)
             }
             false => {
                 source.note_fill(number);
@@ -143,7 +143,7 @@ impl Drop for Chunk {
 fn bricks_of(source: &Source, splats: &Splats, number: u32, (volume, low): (&Volume, UVec3)) -> Vec<Brick> {
     let Splats { transfer, clipped, .. } = splats;
     let (from, dims) = source.bounds(number);
-    let own = Grid { dims, ..source.grid };
+    let own = source.grid.resized(dims);
     let taking_part = TakingPart::new(volume, transfer);
     let list = BrickList::by_rows(&own, &|y, z, flags: &mut [bool]| {
         let at = from + UVec3::new(0, y, z);

@@ -33,7 +33,7 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
 use crate::volume::range::range_of;
-use crate::volume::{Grid, StoreLevel, StreamedLevel, StreamedVolume, Values, Volume};
+use crate::volume::{StoreLevel, StreamedLevel, StreamedVolume, Values, Volume};
 
 /// The minimum number of threads that read: a server, or a disk, answers several requests in the time of one.
 const LEAST_READERS: usize = 8;
@@ -165,7 +165,7 @@ impl StreamRenderer {
         let host = Host { window, is_part, first_hit: None, surfaces: None };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
             Classification::After => {
-                let nothing = Volume::piece(Grid { dims: UVec3::ZERO, ..grid }, Values::default());
+                let nothing = Volume::piece(grid.resized(UVec3::ZERO), Values::default());
                 let (numbers, is_range_known) = self.numbers();
                 let matter = Matter::Streamed { stream: &stream, nothing: &nothing, numbers, is_range_known };
                 let frame = after::Frame::new(0, (matter, &self.transfer), scene, view, host);
@@ -179,15 +179,13 @@ impl StreamRenderer {
         }
         let Reads { chunks, bytes, most_held, .. } = stream.pool.reads();
         let StreamedLevel { store, level, .. } = &self.values;
-        let store = StoreCounts {
-            level: *level as u64,
-            chunks_total: store.levels()[*level].chunks().as_u64vec3().element_product(),
-            chunks_read: chunks.len() as u64,
-            bytes_read: bytes,
-            chunk_bytes: most_held,
-            ..StoreCounts::default()
-        };
-        let store = self.volume.with_sample(store);
+        let mut read = StoreCounts::default();
+        read.level = *level as u64;
+        read.chunks_total = store.levels()[*level].chunks().as_u64vec3().element_product();
+        read.chunks_read = chunks.len() as u64;
+        read.bytes_read = bytes;
+        read.chunk_bytes = most_held;
+        let store = self.volume.with_sample(read);
         Ok((content, Stats { store: Some(store), ..statistics(self.simd, size, counts, start) }))
     }
 

@@ -197,7 +197,7 @@ impl Source {
     pub(super) fn around(&self, voxel: UVec3, mut value: impl FnMut(UVec3) -> f32) -> (Volume, UVec3) {
         let low = voxel.saturating_sub(UVec3::ONE);
         let dims = (voxel + 2).min(self.grid.dims) - low;
-        let grid = Grid { dims, ..self.grid };
+        let grid = self.grid.resized(dims);
         let at = voxel - low;
         let mut values = vec![f32::NAN; dims.element_product() as usize];
         values[grid.index_of(at) as usize] = value(voxel);

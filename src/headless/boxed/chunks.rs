@@ -176,14 +176,13 @@ impl<'a> Chunks<'a> {
     /// What has been read.
     pub(super) fn counts(&self) -> StoreCounts {
         let levels = || self.channels.iter().flat_map(ChannelChunks::levels);
-        StoreCounts {
-            level: self.volume.level() as u64,
-            chunks_total: self.volume.chunks(),
-            chunks_read: levels().map(LevelChunks::chunks_read).sum(),
-            bytes_read: levels().map(LevelChunks::bytes_read).sum(),
-            chunk_bytes: self.most_held + levels().map(LevelChunks::most_kept).sum::<u64>(),
-            ..StoreCounts::default()
-        }
+        let mut counts = StoreCounts::default();
+        counts.level = self.volume.level() as u64;
+        counts.chunks_total = self.volume.chunks();
+        counts.chunks_read = levels().map(LevelChunks::chunks_read).sum();
+        counts.bytes_read = levels().map(LevelChunks::bytes_read).sum();
+        counts.chunk_bytes = self.most_held + levels().map(LevelChunks::most_kept).sum::<u64>();
+        counts
     }
 
     /// The channels that have an opacity.

@@ -154,8 +154,9 @@ impl<'a> Pages<'a> {
 
     /// What has been read.
     pub(super) fn counts(&self) -> StoreCounts {
-        let counts = self.chunks.counts();
-        StoreCounts { chunk_bytes: counts.chunk_bytes + self.pool.bytes(), ..counts }
+        let mut counts = self.chunks.counts();
+        counts.chunk_bytes += self.pool.bytes();
+        counts
     }
 
     /// The first step in which slabs behind a region are drawn front to back: as many as opaque pixels are not likely to hide, if they hide anything, and as pages

@@ -1,0 +1,332 @@
+//! Limits on reading: which files may be opened, and how much memory their values may use.
+
+use std::borrow::Cow;
+use std::collections::BTreeSet;
+use std::fmt::{self, Debug, Display, Formatter};
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use super::VolumeError;
+use super::address;
+use super::file::{BytesRead, Files};
+use super::memory;
+use super::seek::{Located, Notes};
+use super::series::Selection;
+use super::source::{Source, invalid, io_error};
+
+/// Options for reading volumes, labels and scenes. By default files may lie anywhere.
+///
+/// ```
+/// use sheetsplat::volume::ReadOptions;
+///
+/// let options = ReadOptions::default().confined_to("uploads").with_memory(2 << 30);
+/// ```
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ReadOptions {
+    /// The folder that every file must lie in once links are followed; `None` allows any place.
+    pub confine: Option<PathBuf>,
+    /// The maximum number of bytes for the values of a volume and its labels together. `None` means three quarters of the machine's
+    /// memory, or of what the process's control group may use if that is less.
+    pub memory: Option<u64>,
+    /// The number, from 0, of the only channel to read of a file with several; `None` reads all.
+    pub channel: Option<u32>,
+    /// The number, from 0, of the time to read of a file with several; `None` reads the first.
+    pub time: Option<u32>,
+    /// The level, from 0 for the finest, to read of a store with several; `None` reads the one that a scene chooses
+    /// ([`Scene::choose_levels`](crate::Scene::choose_levels)), and without a scene the finest, which must fit in memory.
+    pub level: Option<u32>,
+    /// The file with the ranges of the values in a store's chunks, made by `sheetsplat index` ([`StoreIndex`](super::StoreIndex)). Where a scene's volume is
+    /// streamed, chunks without visible values are not read.
+    pub index: Option<PathBuf>,
+    /// Files in memory, which are read instead of the disk's; `None` reads the disk.
+    pub files: Option<Files>,
+    /// What counts the bytes that are read, for programs that show how far they are.
+    pub bytes_read: Option<BytesRead>,
+}
+
+impl ReadOptions {
+    /// These options with files confined to this folder.
+    pub fn confined_to(self, folder: impl Into<PathBuf>) -> Self {
+        Self { confine: Some(folder.into()), ..self }
+    }
+
+    /// These options with one channel of a file with several, counted from 0.
+    pub fn with_channel(self, channel: u32) -> Self {
+        Self { channel: Some(channel), ..self }
+    }
+
+    /// These options with another time of a file with several, counted from 0.
+    pub fn with_time(self, time: u32) -> Self {
+        Self { time: Some(time), ..self }
+    }
+
+    /// These options with another level of a store with several, counted from 0 for the finest.
+    pub fn with_level(self, level: u32) -> Self {
+        Self { level: Some(level), ..self }
+    }
+
+    /// These options with an index of the store's chunks.
+    pub fn with_index(self, index: impl Into<PathBuf>) -> Self {
+        Self { index: Some(index.into()), ..self }
+    }
+
+    /// These options with files in memory instead of the disk's, where a program has no disk, as in a browser, or does not trust paths. Whatever
+    /// names a file then names one of these: a scene, its volumes and labels, and headers with separate data.
+    ///
+    /// ```
+    /// use std::path::Path;
+    /// use sheetsplat::Volume;
+    /// use sheetsplat::volume::ReadOptions;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: a.raw\n";
+    /// let files = [("a.nhdr", header.as_bytes()), ("a.raw", &[0, 1, 2, 3, 4, 5, 6, 7])];
+    /// let volume = Volume::open_with(Path::new("a.nhdr"), &ReadOptions::default().with_files(files.into_iter().collect()))?;
+    /// assert_eq!(volume.values().at(5), 5.0);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn with_files(self, files: Files) -> Self {
+        Self { files: Some(files), ..self }
+    }
+
+    /// These options with a count of the bytes that are read.
+    pub fn counted_by(self, bytes_read: &BytesRead) -> Self {
+        Self { bytes_read: Some(bytes_read.clone()), ..self }
+    }
+
+    /// The limit of [`Self::memory`], or the default.
+    pub fn memory_limit(&self) -> u64 {
+        self.memory.unwrap_or_else(memory::default_limit)
+    }
+
+    /// The bytes of a memory limit as text: a number, alone or with a unit, as in `2GiB`.
+    ///
+    /// # Errors
+    /// If it is no such text; the error tells what is allowed.
+    pub fn parse_memory(text: &str) -> Result<u64, String> {
+        memory::parse_size(text)
+    }
+
+    /// These options with another memory limit in bytes.
+    pub fn with_memory(self, bytes: u64) -> Self {
+        Self { memory: Some(bytes), ..self }
+    }
+}
+
+/// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
+#[derive(Clone)]
+pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>);
+
+struct Inner {
+    given: Option<Files>,
+    folder: Option<Folder>,
+    limit: u64,
+    reserved: AtomicU64,
+    bytes_read: Option<BytesRead>,
+    files: Mutex<BTreeSet<PathBuf>>,
+}
+
+/// The folder to which files are confined.
+struct Folder {
+    /// The path in the options, for errors.
+    named: PathBuf,
+    canonical: PathBuf,
+}
+
+impl Access {
+    #[doc(hidden)]
+    pub fn new(options: &ReadOptions) -> Result<Self, VolumeError> {
+        let folder = |named: &PathBuf| {
+            let canonical = named.canonicalize().map_err(io_error(named))?;
+            Ok(Folder { named: named.clone(), canonical })
+        };
+        let given = options.files.clone();
+        let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
+        let limit = options.memory_limit();
+        let (reserved, bytes_read) = (AtomicU64::new(0), options.bytes_read.clone());
+        let inner = Inner { given, folder, limit, reserved, bytes_read, files: Mutex::default() };
+        Ok(Self(
+            Arc::new(inner),
+            Selection { channel: options.channel, time: options.time, level: options.level },
+            None,
+        ))
+    }
+
+    /// The same access for readers that only note where samples are, and read none.
+    pub(super) fn noting(&self) -> (Self, Arc<Notes>) {
+        let notes = Arc::new(Notes::default());
+        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes))), notes)
+    }
+
+    /// Whether readers note where samples are, and read none.
+    pub(super) fn is_noting(&self) -> bool {
+        self.2.is_some()
+    }
+
+    /// Notes where samples are.
+    pub(super) fn note(&self, located: Located) {
+        if let Some(notes) = &self.2 {
+            notes.lock().unwrap_or_else(PoisonError::into_inner).push(located);
+        }
+    }
+
+    /// What is read of files with several volumes.
+    pub(crate) fn selection(&self) -> Selection {
+        self.1
+    }
+
+    /// The same access to files of one volume, at a level.
+    #[doc(hidden)]
+    pub fn whole_at(&self, level: u32) -> Self {
+        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None)
+    }
+
+    /// The same access to other volumes of a file. What the options select goes before it.
+    #[doc(hidden)]
+    pub fn selecting(&self, other: Selection) -> Self {
+        let Selection { channel, time, level } = self.1;
+        let (channel, time, level) = (channel.or(other.channel), time.or(other.time), level.or(other.level));
+        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone())
+    }
+
+    /// The path to open for a file or folder. If reading is confined, it has no links in it.
+    ///
+    /// # Errors
+    /// If reading is confined and the path leads out of the folder, whether or not the file exists.
+    #[doc(hidden)]
+    pub fn resolve<'a>(&self, path: &'a Path) -> Result<Cow<'a, Path>, VolumeError> {
+        let Some(folder) = &self.0.folder else { return Ok(Cow::Borrowed(path)) };
+        let resolved = path.canonicalize();
+        // For a path outside the folder the error does not reveal whether the file exists.
+        let place = match &resolved {
+            Ok(resolved) => Some(resolved.clone()),
+            Err(_) => {
+                let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+                parent.unwrap_or(Path::new(".")).canonicalize().ok().filter(|_| !path.is_symlink())
+            }
+        };
+        if !place.is_some_and(|place| place.starts_with(&folder.canonical)) {
+            let allowed = format!("files within {}, to which reading is confined", folder.named.display());
+            return Err(invalid(path, "file", "a path that leads elsewhere", allowed));
+        }
+        resolved.map(Cow::Owned).map_err(io_error(path))
+    }
+
+    /// What counts the bytes that are read.
+    pub(super) fn bytes_read(&self) -> Option<BytesRead> {
+        self.0.bytes_read.clone()
+    }
+
+    /// The files in memory that are read instead of the disk's.
+    pub(super) fn given(&self) -> Option<&Files> {
+        self.0.given.as_ref()
+    }
+
+    /// Whether a path is the address of a store that is read over HTTP.
+    ///
+    /// # Errors
+    /// If it is, and reading is confined to a folder.
+    pub(super) fn is_address(&self, path: &Path) -> Result<bool, VolumeError> {
+        if self.given().is_some() || !address::is_address(path) {
+            return Ok(false);
+        }
+        let Some(folder) = &self.0.folder else { return Ok(true) };
+        let allowed = format!("files within {}, to which reading is confined", folder.named.display());
+        Err(invalid(path, "file", "an address", allowed))
+    }
+
+    /// Whether a path is that of a folder.
+    ///
+    /// # Errors
+    /// As for [`Self::resolve`].
+    pub(super) fn is_folder(&self, path: &Path) -> Result<bool, VolumeError> {
+        match self.given() {
+            Some(files) => Ok(files.in_folder(path).next().is_some()),
+            None => Ok(self.resolve(path)?.is_dir()),
+        }
+    }
+
+    /// A file's text.
+    ///
+    /// # Errors
+    /// If reading is confined and the path leads out of the folder; within, if the file cannot be read or is not UTF-8.
+    #[doc(hidden)]
+    pub fn text(&self, path: &Path) -> Result<io::Result<String>, VolumeError> {
+        let utf8 = |bytes: &Arc<[u8]>| {
+            String::from_utf8(bytes.to_vec()).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
+        };
+        match self.given() {
+            Some(files) => Ok(files.get(path).and_then(utf8)),
+            None => Ok(std::fs::read_to_string(self.resolve(path)?)),
+        }
+    }
+
+    pub(super) fn open(&self, path: &Path) -> Result<Source, VolumeError> {
+        let source = self.open_to_look(path)?;
+        self.0.files.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned());
+        Ok(source)
+    }
+
+    /// Opens a file only to determine its format.
+    pub(super) fn open_to_look(&self, path: &Path) -> Result<Source, VolumeError> {
+        match self.given() {
+            Some(files) => Ok(Source::in_memory(path, files.get(path).map_err(io_error(path))?, self)),
+            None => Source::open(path, &self.resolve(path)?, self),
+        }
+    }
+
+    /// The files opened so far, without those of which only the format was determined.
+    #[doc(hidden)]
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.0.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+    }
+
+    /// The number of bytes of memory that are left.
+    #[cfg(feature = "zarr")]
+    pub(super) fn memory_left(&self) -> u64 {
+        self.0.limit.saturating_sub(self.0.reserved.load(Ordering::Relaxed))
+    }
+
+    /// Reserves `bytes` of memory, before they are allocated, for what `found` describes.
+    ///
+    /// # Errors
+    /// If fewer bytes are left of the limit.
+    #[doc(hidden)]
+    pub fn reserve(&self, path: &Path, field: &str, found: impl Display, bytes: u64) -> Result<(), VolumeError> {
+        let Inner { limit, reserved, .. } = &*self.0;
+        let add = |reserved: u64| reserved.checked_add(bytes).filter(|sum| sum <= limit);
+        let Err(before) = reserved.fetch_update(Ordering::Relaxed, Ordering::Relaxed, add) else { return Ok(()) };
+        let others = if before > 0 { format!(", of which {before} are taken") } else { String::new() };
+        let allowed = format!("at most the memory limit of {limit} bytes{others}");
+        Err(invalid(path, field, format!("{found}, which take {bytes} bytes of memory"), allowed))
+    }
+}
+
+impl Debug for Access {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Access").field(&self.1).finish()
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_counted() {
+        let access = Access::new(&ReadOptions::default().with_memory(100)).unwrap();
+        let reserve = |bytes| access.clone().reserve(Path::new("a"), "data", "voxels", bytes);
+        assert!(reserve(60).is_ok());
+        let message = reserve(41).unwrap_err().to_string();
+        let expected = "a: data: found voxels, which take 41 bytes of memory, allowed: at most the memory limit of 100 bytes, of which 60 are taken";
+        assert_eq!(message, expected);
+        assert!(reserve(u64::MAX).is_err());
+        assert!(reserve(40).is_ok());
+        assert!(reserve(1).is_err());
+    }
+}

@@ -1,0 +1,32 @@
+//! Addresses of stores that are read over HTTP, which stand where paths do.
+
+use std::path::{Path, PathBuf};
+
+/// Whether a path is an address.
+pub fn is_address(path: &Path) -> bool {
+    let begins =
+        |text: &str, scheme: &str| text.get(..scheme.len()).is_some_and(|head| head.eq_ignore_ascii_case(scheme));
+    path.to_str().is_some_and(|text| ["http://", "https://"].iter().any(|scheme| begins(text, scheme)))
+}
+
+/// A path that is written in a folder: one that is relative leads from there, an address does not.
+pub fn written_in(folder: &Path, path: &str) -> PathBuf {
+    if is_address(Path::new(path)) { PathBuf::from(path) } else { folder.join(path) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn addresses_are_no_paths_of_a_folder() {
+        for path in ["http://a/b.zarr", "HTTPS://a", "https://a:8080/b.zarr?c=d"] {
+            assert!(is_address(Path::new(path)));
+            assert_eq!(written_in(Path::new("folder"), path), PathBuf::from(path));
+        }
+        for path in ["", "http", "http:/a", "ftp://a/b", "file:///a", "a/http://b", "é"] {
+            assert!(!is_address(Path::new(path)));
+            assert_eq!(written_in(Path::new("folder"), path), Path::new("folder").join(path));
+        }
+    }
+}

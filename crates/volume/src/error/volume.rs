@@ -1,0 +1,57 @@
+//! Errors of volumes, which are loaded before anything is drawn, or while it is.
+
+use std::path::PathBuf;
+
+/// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is allowed.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VolumeError {
+    /// The file could not be opened or read.
+    #[error("{}: {source}", path.display())]
+    #[non_exhaustive]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// The operating system's error.
+        source: std::io::Error,
+    },
+    /// A header field, or the data it promises, is invalid.
+    #[error("{origin}: {field}: found {found}, allowed: {allowed}")]
+    #[non_exhaustive]
+    Invalid {
+        /// The file, or `builtin:NAME`.
+        origin: String,
+        /// The header field or the part of the file (`sizes`, `space directions`, `data`).
+        field: String,
+        /// What was found there.
+        found: String,
+        /// What would have been accepted.
+        allowed: String,
+    },
+}
+
+impl VolumeError {
+    /// The error of a file that could not be read, for [`Store`](crate::Store)s of other programs.
+    pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
+        Self::Io { path: path.into(), source }
+    }
+
+    /// `Ok` with the file and the system's error, or `Err` with the origin, the field, what was found and what is allowed.
+    #[doc(hidden)]
+    pub fn into_parts(self) -> Result<(PathBuf, std::io::Error), [String; 4]> {
+        match self {
+            Self::Io { path, source } => Ok((path, source)),
+            Self::Invalid { origin, field, found, allowed } => Err([origin, field, found, allowed]),
+        }
+    }
+
+    /// The error of an invalid field, for [`Store`](crate::Store)s of other programs.
+    pub fn invalid(
+        origin: impl Into<String>,
+        field: impl Into<String>,
+        found: impl Into<String>,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Self::Invalid { origin: origin.into(), field: field.into(), found: found.into(), allowed: allowed.into() }
+    }
+}

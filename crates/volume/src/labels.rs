@@ -1,0 +1,128 @@
+//! Labels: the segment that each voxel of a segmented volume belongs to.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::{DVec3, UVec3};
+
+use super::access::{Access, ReadOptions};
+use super::format;
+use super::loaded::Loaded;
+use super::voxel::Voxel;
+use super::{Grid, Volume, VolumeError, invalid};
+
+/// Spacings whose relative difference is less than this count as equal.
+const SAME_SPACING: f64 = 1e-4;
+
+/// One label per voxel of a grid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Labels {
+    /// The name in errors: a file.
+    pub origin: String,
+    /// The number of voxels along x, y and z.
+    pub dims: UVec3,
+    /// The distance between voxels in world units; `None` matches any volume's.
+    pub spacing: Option<DVec3>,
+    /// The labels, x fastest.
+    pub values: Arc<[u16]>,
+    /// The labels' names, where known.
+    pub names: BTreeMap<u16, String>,
+}
+
+impl Labels {
+    /// Reads a label file: a volume file of any format that [`Volume::open`] reads, with whole numbers from 0 to 65535 in any sample type.
+    ///
+    /// # Errors
+    /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is not a
+    /// label (the error names the voxel).
+    pub fn open(path: &Path) -> Result<Self, VolumeError> {
+        Self::open_with(path, &ReadOptions::default())
+    }
+
+    /// Like [`Self::open`], with a folder that files must lie in and a memory limit.
+    ///
+    /// # Errors
+    /// As for [`Self::open`], and if the file, or one that its header names, lies outside the folder.
+    pub fn open_with(path: &Path, options: &ReadOptions) -> Result<Self, VolumeError> {
+        Self::read(path, &Access::new(options)?)
+    }
+
+    #[doc(hidden)]
+    pub fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let (_, loaded) = format::read::<u16>(path, access)?;
+        loaded.check_single(path, "one: a label for every voxel")?;
+        let Loaded { dims, spacing, label_names: names, values, .. } = loaded;
+        Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
+    }
+}
+
+/// The labels among values: of every `step`th voxel along each axis of a file, from voxel `from` on.
+///
+/// # Errors
+/// If a value is no label; the error names the file and the voxel.
+pub fn labels_of(
+    origin: &str,
+    (from, dims, step): (UVec3, UVec3, u32),
+    values: impl IntoIterator<Item = f32>,
+) -> Result<Arc<[u16]>, VolumeError> {
+    let label = |(index, value): (u32, f32)| {
+        u16::of(value).ok_or_else(|| {
+            let voxel = from + step * Grid::new(dims, DVec3::ONE).voxel_at(index);
+            invalid(origin, "data", format!("{value} at voxel {voxel}"), u16::ALLOWED.to_owned())
+        })
+    };
+    (0..).zip(values).map(label).collect()
+}
+
+impl Volume {
+    /// The same volume with other labels.
+    ///
+    /// # Errors
+    /// If the labels' grid is another than the volume's.
+    pub fn with_labels(mut self, labels: Labels) -> Result<Self, VolumeError> {
+        let Labels { origin, dims, spacing, values, names } = labels;
+        let shown = |spacing: DVec3| format!("{:?}", spacing.to_array());
+        if dims != self.dims() {
+            return Err(invalid(&origin, "sizes", format!("{dims}"), format!("{}, the volume's", self.dims())));
+        }
+        let (found, allowed) = (values.len(), self.values().len());
+        if found != allowed {
+            return Err(invalid(&origin, "data", format!("{found} labels"), format!("{allowed} labels")));
+        }
+        let differs = |spacing: &DVec3| {
+            let largest = spacing.max(self.spacing());
+            !(*spacing - self.spacing()).abs().cmple(SAME_SPACING * largest).all()
+        };
+        if let Some(other) = spacing.filter(differs) {
+            return Err(invalid(&origin, "spacing", shown(other), format!("{}, the volume's", shown(self.spacing()))));
+        }
+        self.labels = Some(values);
+        self.label_names = names;
+        Ok(self)
+    }
+
+    /// All labels, x fastest, then y, then z; `None` if the volume is not segmented.
+    pub fn labels(&self) -> Option<&[u16]> {
+        self.labels.as_deref()
+    }
+
+    /// The names of labels, where known: of a segmented volume, or of one whose values are labels.
+    pub fn label_names(&self) -> &BTreeMap<u16, String> {
+        &self.label_names
+    }
+
+    /// Whether the values are known to be labels, whatever they look like: they were resampled as labels, or their file names them.
+    #[doc(hidden)]
+    pub fn is_known_label_map(&self) -> bool {
+        self.is_label_map || self.labels.is_none() && !self.label_names.is_empty()
+    }
+
+    /// The label of the voxel at an index in memory; `None` if the volume is not segmented.
+    ///
+    /// # Panics
+    /// If the volume is segmented and the voxel lies outside it.
+    pub fn label(&self, index: u32) -> Option<u16> {
+        self.labels.as_ref().map(|labels| labels[index as usize])
+    }
+}

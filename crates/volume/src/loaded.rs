@@ -1,0 +1,104 @@
+//! The result of every reader.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use glam::{DVec3, UVec3};
+
+use super::display::ChannelDisplay;
+use super::samples::SampleType;
+use super::series::Series;
+use super::source::invalid;
+use super::voxel::{Many, Voxel};
+use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
+use crate::StoreCounts;
+
+/// The contents of a file of values or labels.
+pub struct Loaded<T: Voxel> {
+    pub dims: UVec3,
+    /// The type of the samples in the file.
+    pub kind: SampleType,
+    /// World units between voxels, if the file states them.
+    pub(super) spacing: Option<DVec3>,
+    /// The unit of the spacing, if the file states it.
+    pub(super) unit: Option<String>,
+    /// The orientation, if the file states it.
+    pub(super) orientation: Option<Orientation>,
+    /// The colours that the file assigns to values, in ascending order of values.
+    pub(super) palette: Option<Vec<(f64, DVec3)>>,
+    /// The values' names, if they are labels.
+    pub(super) label_names: BTreeMap<u16, String>,
+    /// The volumes in the file.
+    pub(super) series: Series,
+    /// The names of the file's channels, from the first on; there may be fewer than channels.
+    pub(super) channel_names: Vec<String>,
+    /// How the channels are shown, from the first on; there may be fewer than channels.
+    pub(super) displays: Vec<ChannelDisplay>,
+    /// The levels in the file, of which the values are one.
+    pub(super) levels: Option<Levels>,
+    /// One value per voxel, x fastest, channel by channel.
+    pub values: T::Many,
+}
+
+/// The levels of a volume, and the one that is read (SPEC §13).
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Levels {
+    /// The number of voxels of each level along x, y and z, from the finest.
+    pub(super) dims: Vec<UVec3>,
+    /// The number of the level that is read, and its grid.
+    pub(super) level: u32,
+    pub(super) grid: Grid,
+    /// What was read for it.
+    pub(super) reads: StoreCounts,
+}
+
+impl<T: Voxel> Loaded<T> {
+    /// Values about which the file states nothing else.
+    pub(super) fn new(dims: UVec3, kind: SampleType, values: T::Many) -> Self {
+        let (label_names, series, channel_names) = (BTreeMap::new(), Series::default(), Vec::new());
+        let (spacing, unit, orientation, palette) = (None, None, None, None);
+        let (displays, levels) = (Vec::new(), None);
+        Self {
+            dims,
+            kind,
+            spacing,
+            unit,
+            orientation,
+            palette,
+            label_names,
+            series,
+            channel_names,
+            displays,
+            levels,
+            values,
+        }
+    }
+
+    /// What the file, of some format, states about one of its channels.
+    pub(super) fn facts(&self, format: &'static str, channel: usize) -> StoreFacts {
+        let Self { series, spacing, unit, orientation, palette, label_names, .. } = self;
+        let channels = if series.is_color { 1 } else { series.channels };
+        let display = self.displays.get(channel).filter(|display| **display != ChannelDisplay::default());
+        StoreFacts {
+            encoding: Some(Encoding { format, sample_type: self.kind, channels, times: series.times }),
+            spacing: *spacing,
+            unit: unit.clone(),
+            orientation: *orientation,
+            palette: palette.clone(),
+            label_names: label_names.clone(),
+            channel_name: self.channel_names.get(channel).cloned(),
+            display: display.cloned(),
+        }
+    }
+
+    /// Checks that the values are those of one channel.
+    ///
+    /// # Errors
+    /// If they are not; `allowed` says why they must be.
+    pub(super) fn check_single(&self, path: &Path, allowed: &str) -> Result<(), VolumeError> {
+        match self.values.count() / self.dims.element_product() as usize {
+            1 => Ok(()),
+            count => Err(invalid(path, "channels", count, allowed)),
+        }
+    }
+}

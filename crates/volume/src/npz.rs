@@ -1,0 +1,77 @@
+//! NumPy's NPZ files: ZIP archives of NPY files, stored or deflated.
+
+use std::path::Path;
+
+use super::VolumeError;
+use super::access::Access;
+#[cfg(feature = "npy")]
+use super::format::archive_and_inner;
+use super::loaded::Loaded;
+use super::npy;
+use super::source::invalid;
+#[cfg(feature = "npy")]
+use super::source::shown;
+use super::voxel::Voxel;
+use super::zip::Directory;
+#[cfg(feature = "npy")]
+use super::zip::Member;
+
+/// The maximum number of names shown in an error.
+#[cfg(feature = "npy")]
+const SHOWN: usize = 12;
+
+/// Reads the only array of a file, or the one that the path names after a colon: `file.npz:name`.
+#[cfg(feature = "npy")]
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let (archive, wanted) = archive_and_inner(path);
+    let mut file = access.open(archive)?;
+    let members = Directory::read(&mut file)?.members(&mut file, ".npy")?;
+    let names = || {
+        let names = members.iter().take(SHOWN).map(|member| shown(array_name(member)));
+        let more = if members.len() > SHOWN { ", …" } else { "" };
+        format!("{} arrays: {}{more}", members.len(), names.collect::<Vec<_>>().join(", "))
+    };
+    let member = match (wanted, members.as_slice()) {
+        (None, [member]) => member,
+        (None, _) => {
+            return Err(invalid(
+                archive,
+                "arrays",
+                names(),
+                "one array, or its name behind a colon, as in file.npz:name",
+            ));
+        }
+        (Some(name), _) => members
+            .iter()
+            .find(|member| array_name(member) == name)
+            .ok_or_else(|| invalid(path, "arrays", names(), format!("an array called {}", shown(name))))?,
+    };
+    npy::read_array(path, member.open(file)?)
+}
+
+/// Reads the text of one file of an archive, of at most `most` bytes, and one array.
+pub fn read_text_and_array<T: Voxel>(
+    path: &Path,
+    (text, most): (&str, u64),
+    array: &str,
+    access: &Access,
+) -> Result<(String, Loaded<T>), VolumeError> {
+    let mut file = access.open(path)?;
+    let directory = Directory::read(&mut file)?;
+    let mut member = |name: &str| {
+        let found = directory.members(&mut file, name)?.into_iter().find(|member| member.name == name);
+        found.ok_or_else(|| invalid(path, "archive", "none with this name", format!("a file {name} in it")))
+    };
+    let (text, array) = (member(text)?, member(array)?);
+    if text.bytes > most {
+        return Err(invalid(path, &text.name, format!("{} bytes", text.bytes), format!("at most {most} bytes")));
+    }
+    let bytes = text.open(file)?.bytes(text.bytes)?;
+    Ok((String::from_utf8_lossy(&bytes).into_owned(), npy::read_array(path, array.open(access.open(path)?)?)?))
+}
+
+/// The name of a file's array in NumPy.
+#[cfg(feature = "npy")]
+fn array_name(member: &Member) -> &str {
+    member.name.strip_suffix(".npy").unwrap_or(&member.name)
+}

@@ -1,0 +1,308 @@
+//! Volumes that are read while they are drawn.
+
+use std::sync::Arc;
+
+use glam::UVec3;
+
+use super::adapted::{AdaptedStore, Tally};
+use super::resample::{Oriented, is_same_grid};
+use super::sample::{parts_of, sample_at, spread};
+use super::{ChunkProgress, Grid, IndexedStore, Labels, Store, StoreIndex, Volume, VolumeError, invalid, labels_of};
+use crate::StoreCounts;
+
+/// A volume that is drawn without being in memory as a whole (SPEC §13): one channel or several on one grid, each with labels or without.
+#[derive(Clone, Debug)]
+pub struct StreamedVolume {
+    /// The first channel, whose grid is that of all.
+    pub first: StreamedChannel,
+    /// The channels after the first (SPEC §10).
+    pub further: Vec<StreamedChannel>,
+    /// Values by which everything is chosen that scenes leave open, such as the transfer function and the camera's frame: a coarser level, or a subset of the
+    /// voxels, with the same box, and with all channels and labels.
+    pub sample: Arc<Volume>,
+    /// The bytes that chunks may hold together; beyond them those are dropped, and read again, that no tile is drawn from.
+    pub memory: u64,
+}
+
+/// A channel of a [`StreamedVolume`].
+#[derive(Clone, Debug)]
+pub struct StreamedChannel {
+    /// The values.
+    pub values: StreamedLevel,
+    /// A label for every voxel, a whole number from 0 to 65535; `None` if the channel is not segmented.
+    pub labels: Option<StreamedLevel>,
+}
+
+/// A level of a store that is read while it is drawn.
+#[derive(Clone, Debug)]
+pub struct StreamedLevel {
+    /// The name in errors: a file.
+    pub origin: String,
+    /// The store.
+    pub store: Arc<dyn Store>,
+    /// The number of the level, from 0 for the finest.
+    pub level: usize,
+}
+
+impl StreamedLevel {
+    /// A level of a store. `origin` names the store in errors.
+    pub fn new(origin: impl Into<String>, store: Arc<dyn Store>, level: usize) -> Self {
+        Self { origin: origin.into(), store, level }
+    }
+
+    /// The grid of the level, which the store must have.
+    pub(crate) fn grid(&self) -> &Grid {
+        &self.store.levels()[self.level].grid
+    }
+
+    /// The minimum and maximum of the values, if the store knows them.
+    #[doc(hidden)]
+    pub fn range(&self) -> Option<[f32; 2]> {
+        self.store.range(self.level)
+    }
+
+    /// Checks that the store has the level.
+    fn check(&self) -> Result<(), VolumeError> {
+        let levels = self.store.levels().len();
+        if self.level < levels {
+            return Ok(());
+        }
+        Err(invalid(&self.origin, "level", self.level.to_string(), format!("0 to {}", levels - 1)))
+    }
+
+    /// The number of the level whose voxels lie on those of a grid, which counts as lying where the finest level does.
+    fn level_on(&self, grid: &Grid) -> Option<usize> {
+        self.store.levels().iter().position(|level| is_same_grid((&level.grid, None), (grid, None)))
+    }
+}
+
+impl From<StreamedLevel> for StreamedChannel {
+    /// A channel without labels.
+    fn from(values: StreamedLevel) -> Self {
+        Self { values, labels: None }
+    }
+}
+
+impl StreamedChannel {
+    /// The channel with labels in place of any others. Labels of a store that states no spacing have that of the values.
+    ///
+    /// # Errors
+    /// If the values' spacing is not one that a store can have.
+    pub fn with_labels(self, labels: StreamedLevel) -> Result<Self, VolumeError> {
+        let finest = |of: &StreamedLevel| of.store.levels()[0].grid.spacing;
+        let (spacing, is_stated) = (finest(&self.values), labels.store.facts().spacing.is_some());
+        let labels = match is_stated || finest(&labels) == spacing {
+            true => labels,
+            false => {
+                let store = AdaptedStore::spaced(&labels.origin, labels.store, spacing)?;
+                StreamedLevel { store: Arc::new(store), ..labels }
+            }
+        };
+        Ok(Self { labels: Some(labels), ..self })
+    }
+
+    /// All that is read: the values and the labels.
+    pub(crate) fn levels(&self) -> impl Iterator<Item = &StreamedLevel> {
+        std::iter::once(&self.values).chain(&self.labels)
+    }
+
+    /// As [`Self::levels`].
+    fn levels_mut(&mut self) -> impl Iterator<Item = &mut StreamedLevel> {
+        std::iter::once(&mut self.values).chain(&mut self.labels)
+    }
+}
+
+impl StreamedVolume {
+    /// Reads the sample of a level of one store that is to be drawn with some bytes of memory: an eighth of them for the sample, half of them for chunks.
+    /// `origin` names the store in errors.
+    ///
+    /// # Errors
+    /// If the store has no such level, cannot be read, or holds no finite value in the sample.
+    pub fn new(origin: &str, store: Arc<dyn Store>, level: usize, memory: u64) -> Result<Self, VolumeError> {
+        Self::of_channels(StreamedLevel::new(origin, store, level).into(), Vec::new(), memory)
+    }
+
+    /// As [`Self::new`], of several channels and labels, which all lie on the grid of the first channel's level. The memory is for all of them together.
+    ///
+    /// # Errors
+    /// As for [`Self::new`], if a level lies on another grid, or if a value of labels in the sample is no label.
+    pub fn of_channels(
+        first: StreamedChannel,
+        further: Vec<StreamedChannel>,
+        memory: u64,
+    ) -> Result<Self, VolumeError> {
+        let sample = sample_of_channels((&first, &further), memory / 8)?.sampling(*first.values.grid());
+        Ok(Self { first, further, sample: Arc::new(sample), memory: memory / 2 })
+    }
+
+    /// The same volume, none of whose chunks is read that an index tells to show nothing: chunks of the channel whose store the index is of. `origin` names the
+    /// index in errors.
+    ///
+    /// # Errors
+    /// If the index is of none of the channels' stores.
+    pub fn with_index(mut self, index: StoreIndex, origin: &str) -> Result<Self, VolumeError> {
+        Self::index((&mut self.first, &mut self.further), index, origin)?;
+        Ok(self)
+    }
+
+    /// As [`Self::with_index`], before the sample is read.
+    #[doc(hidden)]
+    pub fn index(
+        (first, further): (&mut StreamedChannel, &mut [StreamedChannel]),
+        index: StoreIndex,
+        origin: &str,
+    ) -> Result<(), VolumeError> {
+        let of_index = further.iter_mut().find(|channel| index.is_of(&*channel.values.store));
+        let StreamedChannel { values, .. } = of_index.unwrap_or(first);
+        values.store = Arc::new(IndexedStore::new(Arc::clone(&values.store), index, origin)?);
+        Ok(())
+    }
+
+    /// The same volume, with a function that is told of every chunk of all channels and labels when it is read for the first time. Several threads may call it at
+    /// once.
+    pub fn watched_by(mut self, progress: Arc<ChunkProgress>) -> Self {
+        let tally = Arc::new(Tally::new(self.chunks(), progress));
+        for of in std::iter::once(&mut self.first).chain(&mut self.further).flat_map(StreamedChannel::levels_mut) {
+            of.store = Arc::new(AdaptedStore::watched(Arc::clone(&of.store), of.level, &tally));
+        }
+        self
+    }
+
+    /// All channels.
+    pub fn channels(&self) -> impl Iterator<Item = &StreamedChannel> {
+        std::iter::once(&self.first).chain(&self.further)
+    }
+
+    /// A channel by itself, given by its number.
+    ///
+    /// # Panics
+    /// If there is no such channel.
+    #[doc(hidden)]
+    pub fn of_channel(&self, number: usize) -> Self {
+        let at = number.checked_sub(1);
+        let first = at.map_or(&self.first, |at| &self.further[at]).clone();
+        let sample = at.map_or(&self.sample, |at| &self.sample.further[at]);
+        let sample = sample.alone().sampling(*self.grid());
+        Self { first, further: Vec::new(), sample: Arc::new(sample), memory: self.memory }
+    }
+
+    /// The values of the only channel, if there are no others, no labels and no colours.
+    #[doc(hidden)]
+    pub fn only_values(&self) -> Option<&StreamedLevel> {
+        let StreamedChannel { values, labels } = &self.first;
+        (self.further.is_empty() && labels.is_none() && !values.store.has_colors()).then_some(values)
+    }
+
+    /// The number of chunks of all channels and labels.
+    #[doc(hidden)]
+    pub fn chunks(&self) -> u64 {
+        let chunks = |of: &StreamedLevel| of.store.levels()[of.level].chunks().as_u64vec3().element_product();
+        self.channels().flat_map(StreamedChannel::levels).map(chunks).sum()
+    }
+
+    /// The counts of a frame with those of reading the sample.
+    #[doc(hidden)]
+    pub fn with_sample(&self, counts: StoreCounts) -> StoreCounts {
+        let of_sample = self.sample.reads().unwrap_or_default();
+        StoreCounts { sample_chunks_read: of_sample.chunks_read, sample_bytes_read: of_sample.bytes_read, ..counts }
+    }
+
+    /// The number of the first channel's level that is drawn.
+    #[doc(hidden)]
+    pub fn level(&self) -> usize {
+        self.first.values.level
+    }
+
+    /// The grid of the level that is drawn.
+    #[doc(hidden)]
+    pub fn grid(&self) -> &Grid {
+        self.first.values.grid()
+    }
+}
+
+/// Checks that the levels of channels and labels exist and lie on the grid of the first channel's.
+///
+/// # Errors
+/// If one does not.
+pub fn check_grids((first, further): (&StreamedChannel, &[StreamedChannel])) -> Result<(), VolumeError> {
+    fn oriented<'a>(of: &'a StreamedLevel, facts: &'a super::StoreFacts) -> Oriented<'a> {
+        (of.grid(), facts.orientation.as_ref())
+    }
+    first.values.check()?;
+    let facts = first.values.store.facts();
+    for (number, channel) in std::iter::once(first).chain(further).enumerate() {
+        channel.values.check()?;
+        let own = channel.values.store.facts();
+        if !is_same_grid(oriented(&first.values, &facts), oriented(&channel.values, &own)) {
+            return Err(other_grid(&channel.values, &format!("channel[{number}].volume"), "channel[0]", first));
+        }
+        let Some(labels) = &channel.labels else { continue };
+        labels.check()?;
+        // Labels lie where the values do, whatever their file says of the patient.
+        if !is_same_grid((channel.values.grid(), None), (labels.grid(), None)) {
+            return Err(other_grid(labels, "labels", "the values", channel));
+        }
+    }
+    Ok(())
+}
+
+/// The error for a level on another grid than that of a channel.
+fn other_grid(found: &StreamedLevel, key: &str, name: &str, of: &StreamedChannel) -> VolumeError {
+    let shown = |Grid { dims, spacing, .. }: &Grid| format!("{dims} voxels of {spacing}");
+    let allowed =
+        format!("the grid of {name}, {}, for a volume that is streamed, or more memory", shown(of.values.grid()));
+    invalid(&found.origin, key, format!("a grid of {}", shown(found.grid())), allowed)
+}
+
+/// A sample of all channels and labels ([`sample`](super::sample())), which takes at most some bytes, of a level that all of them have.
+///
+/// # Errors
+/// If a level lies on another grid than the first channel's, a store cannot be read or holds no finite value in the sample, or a value of labels is no label.
+pub fn sample_of_channels(
+    (first, further): (&StreamedChannel, &[StreamedChannel]),
+    memory: u64,
+) -> Result<Volume, VolumeError> {
+    check_grids((first, further))?;
+    let channels = || std::iter::once(first).chain(further);
+    let is_on_all = |grid: &Grid| channels().flat_map(StreamedChannel::levels).all(|of| of.level_on(grid).is_some());
+    // The levels that are drawn are among them.
+    let common: Vec<Grid> =
+        first.values.store.levels().iter().map(|level| level.grid).filter(|grid| is_on_all(grid)).collect();
+    let parts: u64 = channels().flat_map(StreamedChannel::levels).map(|of| parts_of(&*of.store)).sum();
+    let (number, step) = spread(&common, memory / parts);
+    let mut reads = StoreCounts::default();
+    let mut read = |of: &StreamedLevel| -> Result<Volume, VolumeError> {
+        let level = of.level_on(&common[number]).unwrap_or(of.level);
+        let sample = sample_at(&of.origin, &*of.store, (level, step))?;
+        let own = sample.reads().unwrap_or_default();
+        reads = StoreCounts {
+            chunks_total: reads.chunks_total + own.chunks_total,
+            chunks_read: reads.chunks_read + own.chunks_read,
+            bytes_read: reads.bytes_read + own.bytes_read,
+            ..own
+        };
+        Ok(sample)
+    };
+    let mut sample = |channel: &StreamedChannel| {
+        let values = read(&channel.values)?;
+        let Some(labels) = &channel.labels else { return Ok(values) };
+        let own = read(labels)?;
+        values.with_labels(Labels {
+            origin: labels.origin.clone(),
+            dims: own.dims(),
+            spacing: None,
+            values: labels_of(&labels.origin, (UVec3::ZERO, own.dims(), step), own.values().iter())?,
+            names: labels.store.facts().label_names,
+        })
+    };
+    let volume = sample(first)?;
+    let further = further.iter().map(sample).collect::<Result<_, VolumeError>>()?;
+    Ok(Volume { reads: Some(reads), ..volume.with_channels(&first.values.origin, further)? })
+}
+
+impl Volume {
+    /// The volume as a sample of the voxels of a grid.
+    fn sampling(self, grid: Grid) -> Self {
+        Self { sampled: Some(grid), ..self }
+    }
+}

@@ -1,0 +1,177 @@
+//! What the samples of files become: values, or labels.
+
+use std::collections::TryReserveError;
+
+use super::samples::{Sample, SampleType};
+use super::values::Values;
+
+/// Voxels in memory, where many together may take fewer bits than each alone.
+pub trait Many<T>: Default + Sync + From<Vec<T>> {
+    fn count(&self) -> usize;
+
+    /// The voxel at an index.
+    fn at(&self, index: usize) -> T;
+
+    /// Makes room for further voxels.
+    ///
+    /// # Errors
+    /// If there is no memory for them.
+    fn try_reserve_exact(&mut self, count: usize) -> Result<(), TryReserveError>;
+
+    /// Appends voxels.
+    ///
+    /// # Errors
+    /// If there is no memory for them. Those before may be lost then.
+    fn append(&mut self, voxels: &[T]) -> Result<(), TryReserveError>;
+
+    fn shrink_to_fit(&mut self);
+
+    /// Exchanges two runs of `count` voxels, of which the first one ends before the other begins.
+    #[cfg(feature = "tiff")]
+    fn swap(&mut self, first: usize, other: usize, count: usize);
+
+    /// Appends those of others that have some indices.
+    ///
+    /// # Errors
+    /// As for [`Self::append`].
+    fn append_from(&mut self, others: &Self, indices: impl Iterator<Item = usize>) -> Result<(), TryReserveError> {
+        /// The voxels that are copied at a time.
+        const BLOCK: usize = 1 << 12;
+        let (mut indices, mut block) = (indices, Vec::with_capacity(BLOCK));
+        loop {
+            block.clear();
+            block.extend(indices.by_ref().take(BLOCK).map(|index| others.at(index)));
+            if block.is_empty() {
+                return Ok(());
+            }
+            self.append(&block)?;
+        }
+    }
+}
+
+/// Values, in the fewest bits that hold them.
+impl Many<f32> for Values {
+    fn count(&self) -> usize {
+        self.as_slice().len()
+    }
+
+    fn at(&self, index: usize) -> f32 {
+        self.as_slice().at(index)
+    }
+
+    fn try_reserve_exact(&mut self, count: usize) -> Result<(), TryReserveError> {
+        self.try_reserve_exact(count)
+    }
+
+    fn append(&mut self, voxels: &[f32]) -> Result<(), TryReserveError> {
+        self.append(voxels)
+    }
+
+    fn shrink_to_fit(&mut self) {
+        self.shrink_to_fit();
+    }
+
+    #[cfg(feature = "tiff")]
+    fn swap(&mut self, first: usize, other: usize, count: usize) {
+        self.swap(first, other, count);
+    }
+}
+
+/// Labels.
+impl Many<u16> for Vec<u16> {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    fn at(&self, index: usize) -> u16 {
+        self[index]
+    }
+
+    fn try_reserve_exact(&mut self, count: usize) -> Result<(), TryReserveError> {
+        self.try_reserve_exact(count)
+    }
+
+    fn append(&mut self, voxels: &[u16]) -> Result<(), TryReserveError> {
+        self.try_reserve(voxels.len())?;
+        self.extend_from_slice(voxels);
+        Ok(())
+    }
+
+    fn shrink_to_fit(&mut self) {
+        self.shrink_to_fit();
+    }
+
+    #[cfg(feature = "tiff")]
+    fn swap(&mut self, first: usize, other: usize, count: usize) {
+        super::values::swap(self, first, other, count);
+    }
+}
+
+/// What samples are converted to: values or labels.
+pub trait Voxel: Copy + Send + Sync {
+    /// Many of them.
+    type Many: Many<Self>;
+
+    const ALLOWED: &'static str;
+
+    /// A voxel without a sample in the file.
+    const HOLE: Self;
+
+    /// Whether every sample is allowed.
+    const HOLDS_ALL: bool;
+
+    /// The voxel for a sample; `None` if the sample is not allowed.
+    fn of(sample: impl Sample) -> Option<Self>;
+
+    /// The voxel between this one and another, at the fraction `part` of the way.
+    fn between(self, other: Self, part: f64) -> Self;
+
+    /// The greatest number of bytes that the voxel of a sample takes among others.
+    fn bytes(kind: SampleType, is_rescaled: bool) -> u64;
+}
+
+/// A value; one that is not finite makes a hole in the volume.
+impl Voxel for f32 {
+    type Many = Values;
+
+    const ALLOWED: &'static str = "numbers";
+    const HOLE: Self = Self::NAN;
+    const HOLDS_ALL: bool = true;
+
+    fn of(sample: impl Sample) -> Option<Self> {
+        Some(sample.to_f32())
+    }
+
+    fn between(self, other: Self, part: f64) -> Self {
+        (f64::from(self) * (1.0 - part) + f64::from(other) * part) as Self
+    }
+
+    fn bytes(kind: SampleType, is_rescaled: bool) -> u64 {
+        let whole = size_of::<Self>() as u64;
+        if is_rescaled || cfg!(target_arch = "wasm32") { whole } else { kind.bytes().min(whole) }
+    }
+}
+
+/// A label.
+impl Voxel for u16 {
+    type Many = Vec<Self>;
+
+    const ALLOWED: &'static str = "labels, whole numbers from 0 to 65535";
+    const HOLE: Self = 0;
+    const HOLDS_ALL: bool = false;
+
+    fn of(sample: impl Sample) -> Option<Self> {
+        let sample = sample.to_f64();
+        let label = sample as Self;
+        (f64::from(label) == sample).then_some(label)
+    }
+
+    /// The nearer of the two labels.
+    fn between(self, other: Self, part: f64) -> Self {
+        if part < 0.5 { self } else { other }
+    }
+
+    fn bytes(_: SampleType, _: bool) -> u64 {
+        size_of::<Self>() as u64
+    }
+}

@@ -1,0 +1,200 @@
+//! Zarr stores (versions 2 and 3): OME-Zarr 0.4 and 0.5 images with their levels and labels, and plain arrays.
+//!
+//! A store is a folder, on disk or at an address, or a ZIP archive of one (`.zip`, `.ozx`). zarrs opens arrays and takes shards and chunks apart; which bytes are read and how much
+//! they may expand to is decided here, in `keys` and `codec`.
+
+mod array;
+mod axes;
+mod blosc;
+mod codec;
+mod display;
+mod half;
+#[cfg(feature = "http")]
+mod http;
+mod image;
+mod json;
+mod keys;
+mod multiscale;
+mod shards;
+
+use std::path::Path;
+use std::sync::Arc;
+
+use glam::UVec3;
+
+use self::array::{Held, Region};
+use self::image::{Image, Level};
+use super::access::Access;
+use super::loaded::{Levels, Loaded};
+use super::samples::{SIZES, dims_of};
+use super::source::invalid;
+use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
+use super::voxel::{Many, Voxel};
+use super::{Grid, StoreFacts, Values, VolumeError};
+use crate::StoreCounts;
+use crate::parallel;
+
+/// Reads an image at one level.
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+    let image = Image::open(path, access)?;
+    let selection = access.selection();
+    image.series.check(path, selection)?;
+    let channels = image.series.channels(selection);
+    let channels = u64::from(channels.start)..u64::from(channels.end);
+    let number = level_of::<T>(&image, channels.end - channels.start, path, access)?;
+    let level = &image.levels[number];
+    let array = &level.array;
+    let dims = level.grid.dims;
+    let voxels = dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?.element_product();
+    let count = (channels.end - channels.start) * u64::from(voxels);
+    let time = u64::from(selection.time.unwrap_or(0));
+    let pieces = array.pieces::<T>(channels.clone(), time);
+    let bytes = array.memory::<T>(channels.end - channels.start);
+    let found = format!("{} × {} × {} voxels of {} channels", dims.x, dims.y, dims.z, count / u64::from(voxels));
+    access.reserve(path, "data", found, bytes)?;
+    let at_once = pieces.iter().map(|piece| array.at_once(piece)).max().unwrap_or(0);
+    array.reserve::<T>(at_once, access)?;
+    let too_many = |error| invalid(path, "data", format!("{count} samples: {error}"), "fewer");
+    let mut values = T::Many::default();
+    let mut held = Held::default();
+    for (at, piece) in pieces.iter().enumerate() {
+        let mut read = Vec::new();
+        read.try_reserve_exact(piece.count()).map_err(too_many)?;
+        read.resize(piece.count(), T::HOLE);
+        let of_piece = array.read(piece, &mut read)?;
+        held = Held { chunks: held.chunks + of_piece.chunks, bytes: held.bytes + of_piece.bytes };
+        match pieces.len() {
+            1 => values = read.into(),
+            _ => {
+                values.append(&read).map_err(too_many)?;
+                // The first piece tells how many bits most values need.
+                if at == 0 {
+                    values.try_reserve_exact(count as usize - read.len()).map_err(too_many)?;
+                }
+            }
+        }
+    }
+    let reads = StoreCounts {
+        level: number as u64,
+        chunks_total: pieces.iter().map(|piece| array.count(piece)).sum(),
+        chunks_read: held.chunks,
+        bytes_read: held.bytes,
+        chunk_bytes: bytes,
+        ..StoreCounts::default()
+    };
+    let spacing = Some(level.grid.spacing);
+    let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
+    let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid, reads });
+    Ok(Loaded { spacing, levels, ..image.stated::<T>(number, values) })
+}
+
+/// The grids of an image's levels, from the finest.
+pub(super) fn grids(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeError> {
+    Ok(Image::open(path, access)?.levels.iter().map(|level| level.grid).collect())
+}
+
+/// The number of the level to read: the selected one, or else the finest. Its values must fit in memory.
+fn level_of<T: Voxel>(image: &Image, channels: u64, path: &Path, access: &Access) -> Result<usize, VolumeError> {
+    let count = image.levels.len();
+    let stated = access.selection().level;
+    let number = stated.unwrap_or(0) as usize;
+    if number >= count {
+        let allowed = if count == 1 { "0, the only one".to_owned() } else { format!("0 to {}", count - 1) };
+        return Err(invalid(path, "level", number, allowed));
+    }
+    let needs = |level: &Level| level.array.memory::<T>(channels);
+    let left = access.memory_left();
+    let fits = |level: &Level| dims_of(level.grid.dims.to_array()).is_some() && needs(level) <= left;
+    if fits(&image.levels[number]) || count == 1 {
+        return Ok(number);
+    }
+    let sizes = image.levels.iter().zip(0..).map(|(level, number)| {
+        let [x, y, z] = level.grid.dims.to_array();
+        format!("{number}: {x} × {y} × {z}, {} bytes", needs(level))
+    });
+    let sizes = sizes.collect::<Vec<_>>().join("; ");
+    let found = match stated {
+        Some(level) => format!("level {level} of the levels {sizes}"),
+        None => format!("no level stated, of the levels {sizes}"),
+    };
+    let allowed = match image.levels.iter().position(fits) {
+        Some(level) => format!("within the memory limit of {left} bytes, level {level} or a coarser one"),
+        None => format!("a level within the memory limit of {left} bytes, of which there is none"),
+    };
+    Err(invalid(path, "level", found, allowed))
+}
+
+/// Opens the selected channels of an image at one time. `format` is the name of the format.
+pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
+    let image = Arc::new(Image::open(path, access)?);
+    let selection = access.selection();
+    image.series.check(path, selection)?;
+    for level in &image.levels {
+        level.array.reserve::<f32>(parallel::current_num_threads(), access)?;
+    }
+    let levels = image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() });
+    let levels: Vec<StoreLevel> = levels.collect();
+    let spacing = Some(image.levels[0].grid.spacing);
+    let stated = Loaded { spacing, ..image.stated::<f32>(0, Values::default()) };
+    let time = u64::from(selection.time.unwrap_or(0));
+    let store = |(at, channel): (usize, u32)| {
+        let facts = facts_of_channel(stated.facts(format, channel as usize), at);
+        let (image, levels) = (Arc::clone(&image), levels.clone());
+        Arc::new(ZarrStore { image, levels, channel: channel.into(), time, facts }) as Arc<dyn Store>
+    };
+    Ok(image.series.channels(selection).enumerate().map(store).collect())
+}
+
+/// One channel of an image at one time, read by boxes.
+#[derive(Debug)]
+struct ZarrStore {
+    image: Arc<Image>,
+    levels: Vec<StoreLevel>,
+    channel: u64,
+    time: u64,
+    facts: StoreFacts,
+}
+
+impl Store for ZarrStore {
+    fn levels(&self) -> &[StoreLevel] {
+        &self.levels
+    }
+
+    fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
+        check_box(&self.image.keys.path, &self.levels, level, (from, dims), values.len())?;
+        let region = Region { channels: self.channel..self.channel + 1, time: self.time, from, dims };
+        Ok(self.image.levels[level].array.read(&region, values)?.bytes)
+    }
+
+    fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError> {
+        check_chunk(&self.image.keys.path, &self.levels, level, chunk)?;
+        self.image.levels[level].array.contains(self.channel, self.time, chunk)
+    }
+
+    fn fill(&self) -> f32 {
+        self.image.levels[0].array.fill()
+    }
+
+    fn decodes_whole_chunks(&self) -> bool {
+        true
+    }
+
+    fn memory(&self, level: usize) -> u64 {
+        let Some(Level { array, .. }) = self.image.levels.get(level) else { return 0 };
+        array.memory::<f32>(1).saturating_add(array.chunk_memory::<f32>(parallel::current_num_threads()))
+    }
+
+    fn facts(&self) -> StoreFacts {
+        self.facts.clone()
+    }
+
+    fn identity(&self) -> String {
+        let mut hash = blake3::Hasher::new();
+        hash.update(b"sheetsplat zarr 1\n");
+        for metadata in &self.image.metadata {
+            hash.update(metadata.to_string().as_bytes()).update(b"\n");
+        }
+        hash.update(&self.channel.to_le_bytes()).update(&self.time.to_le_bytes());
+        hash.finalize().to_hex().to_string()
+    }
+}

@@ -1,0 +1,19 @@
+//! Scalar volumes: dimensions, spacing and values, without any appearance. They are a crate by themselves, `sheetsplat-volume`.
+
+#[doc(inline)]
+pub use sheetsplat_volume::{
+    BytesRead, ChannelDisplay, ChunkProgress, Encoding, Files, Grid, IndexedStore, Labels, Orientation, PatientSide,
+    RawLayout, ReadOptions, SampleType, Store, StoreFacts, StoreIndex, StoreLevel, StreamedChannel, StreamedLevel,
+    StreamedVolume, Texel, ValueIter, ValueSlice, Values, Volume, VolumeError, builtin, open_raw_store, open_store,
+    sample,
+};
+
+#[cfg(feature = "cpu")]
+pub(crate) use sheetsplat_volume::for_type;
+pub(crate) use sheetsplat_volume::internals::{
+    Access, AdaptedStore, COLOR_BYTES, HollowChannel, Resampling, SIZES, SPACING, Sample, Selection, check_grids,
+    check_spacing, dims_of, is_address, labels_of, levels, range, raw_store, sample_of_channels, store, stores,
+    written_in,
+};
+#[cfg(feature = "codecs")]
+pub(crate) use sheetsplat_volume::internals::{npy, npz};
