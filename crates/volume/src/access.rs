@@ -19,7 +19,7 @@ use super::source::{Source, invalid, io_error};
 /// Options for reading volumes, labels and scenes. By default files may lie anywhere.
 ///
 /// ```
-/// use sheetsplat::volume::ReadOptions;
+/// use sheetsplat_volume::ReadOptions;
 ///
 /// let options = ReadOptions::default().confined_to("uploads").with_memory(2 << 30);
 /// ```
@@ -78,8 +78,8 @@ impl ReadOptions {
     ///
     /// ```
     /// use std::path::Path;
-    /// use sheetsplat::Volume;
-    /// use sheetsplat::volume::ReadOptions;
+    /// use sheetsplat_volume::Volume;
+    /// use sheetsplat_volume::ReadOptions;
     ///
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// let header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\ndata file: a.raw\n";

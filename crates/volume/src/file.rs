@@ -53,8 +53,8 @@ fn normal(path: &Path) -> PathBuf {
 ///
 /// ```
 /// use std::path::Path;
-/// use sheetsplat::Volume;
-/// use sheetsplat::volume::{BytesRead, ReadOptions};
+/// use sheetsplat_volume::Volume;
+/// use sheetsplat_volume::{BytesRead, ReadOptions};
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let header = "NRRD0001\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n\n01234567";

@@ -229,13 +229,13 @@ impl Volume {
     /// if fewer bits hold them.
     ///
     /// ```
-    /// use sheetsplat::Volume;
-    /// use sheetsplat::glam::{DVec3, UVec3};
+    /// use sheetsplat_volume::Volume;
+    /// use sheetsplat_volume::glam::{DVec3, UVec3};
     ///
     /// let volume = Volume::from_values("ramp", UVec3::new(4, 1, 1), DVec3::ONE, vec![0_u16, 1, 2, 1000])?;
     /// assert_eq!(volume.values(), [0.0, 1.0, 2.0, 1000.0]);
     /// assert_eq!(volume.values().bytes(), 8);
-    /// # Ok::<(), sheetsplat::volume::VolumeError>(())
+    /// # Ok::<(), sheetsplat_volume::VolumeError>(())
     /// ```
     ///
     /// # Errors
