@@ -2,11 +2,12 @@
 
 use std::ops::Range;
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, Simd};
 use glam::{DVec2, DVec3};
 
 use super::project::Projection;
 use super::sheets::{COLUMNS, ROWS};
+use super::simd::dispatch;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 use crate::parallel::prelude::*;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::{Level, Simd};
 use glam::UVec3;
 
 use super::bin::{self, Placed};
@@ -17,6 +17,7 @@ use super::project::Projection;
 use super::resolve;
 use super::shade::Shader;
 use super::sheets::{COLUMNS, ROWS};
+use super::simd::dispatch;
 use super::splat::Splatter;
 use super::stream::{Chunk, Stream};
 use super::tile::TileWalk;

@@ -98,10 +98,10 @@ const INDEX: [u32; WIDEST] = {
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::{Level, Simd, dispatch};
+    use fearless_simd::{Level, Simd};
 
     use super::*;
-    use crate::cpu::simd::Simd as InstructionSet;
+    use crate::cpu::simd::{Simd as InstructionSet, dispatch};
 
     /// ρ² of an offset.
     fn squared(dx: f32, dy: f32) -> f32 {

@@ -11,12 +11,10 @@ const VARIABLE: &str = "SHEETSPLAT_SIMD";
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Simd {
-    /// Scalar code, except where the compiler vectorizes it.
+    /// Scalar code, except where the compiler vectorizes it, for processors that have none of the others.
     Scalar,
     /// x86; every 64-bit processor has it.
     Sse2,
-    /// x86-64-v2.
-    Sse4_2,
     /// x86-64-v3, of which fused multiply-adds are not used.
     Avx2,
     /// x86 since Ice Lake.
@@ -29,15 +27,13 @@ pub enum Simd {
 
 impl Simd {
     /// All instruction sets, whatever the machine has.
-    pub const ALL: [Self; 7] =
-        [Self::Scalar, Self::Sse2, Self::Sse4_2, Self::Avx2, Self::Avx512, Self::Neon, Self::Simd128];
+    pub const ALL: [Self; 6] = [Self::Scalar, Self::Sse2, Self::Avx2, Self::Avx512, Self::Neon, Self::Simd128];
 
-    /// Its name: `scalar`, `sse2`, `sse4.2`, `avx2`, `avx512`, `neon`, `simd128`.
+    /// Its name: `scalar`, `sse2`, `avx2`, `avx512`, `neon`, `simd128`.
     pub fn name(self) -> &'static str {
         match self {
             Self::Scalar => "scalar",
             Self::Sse2 => "sse2",
-            Self::Sse4_2 => "sse4.2",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
             Self::Neon => "neon",
@@ -53,14 +49,9 @@ impl Simd {
     /// The level of the vector crate; `None` if the machine or the build lacks it.
     fn level(self) -> Option<Level> {
         match self {
-            #[cfg(not(target_arch = "wasm32"))]
-            Self::Scalar => Some(Level::fallback()),
-            #[cfg(all(target_arch = "wasm32", not(target_feature = "simd128")))]
-            Self::Scalar => Some(Level::new()),
+            Self::Scalar => Some(Level::new()).filter(|level| level.is_fallback()),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
             Self::Sse2 => Level::new().as_sse2().map(Level::Sse2),
-            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Self::Sse4_2 => Level::new().as_sse4_2().map(Level::Sse4_2),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
             Self::Avx2 => Level::new().as_avx2().map(Level::Avx2),
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
@@ -81,6 +72,33 @@ impl Simd {
         self.level().ok_or_else(|| refused(self.name()))
     }
 }
+
+/// Compiles code once for each instruction set, and runs it for that of a level. Each set takes the compiler as long as all the rest of the native backend, so
+/// that x86 has three: SSE2 serves processors with SSE4.2, too.
+macro_rules! dispatch {
+    ($level:expr, $simd:ident => $code:expr) => {
+        $crate::cpu::simd::dispatch!(@match $level, $simd => $code;
+            Avx512: any(target_arch = "x86", target_arch = "x86_64"),
+            Avx2: any(target_arch = "x86", target_arch = "x86_64"),
+            Sse2: any(target_arch = "x86", target_arch = "x86_64"),
+            Neon: target_arch = "aarch64",
+            WasmSimd128: all(target_arch = "wasm32", target_feature = "simd128"),
+            Fallback: not(any(
+                all(any(target_arch = "x86", target_arch = "x86_64"), target_feature = "sse2"),
+                target_arch = "aarch64",
+                all(target_arch = "wasm32", target_feature = "simd128"),
+            ))
+        )
+    };
+    (@match $level:expr, $simd:ident => $code:expr; $($set:ident: $target:meta),*) => {
+        match $level {
+            $(#[cfg($target)]
+            fearless_simd::Level::$set($simd) => fearless_simd::Simd::vectorize($simd, #[inline(always)] || $code),)*
+            _ => unreachable!("levels are those of instruction sets that code is compiled for"),
+        }
+    };
+}
+pub(super) use dispatch;
 
 /// The default: the instruction set that the environment forces, else the best one of the machine.
 ///

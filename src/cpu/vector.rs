@@ -143,10 +143,10 @@ pub(super) fn short_polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
-    use fearless_simd::{Level, dispatch};
-
     use super::*;
+    use crate::cpu::simd::{chosen, dispatch};
 
     /// The largest relative error of a function against another over numbers from `low` to `high`.
     fn worst(low: f64, high: f64, ours: impl Fn([f32; LANES]) -> [f32; LANES], exact: impl Fn(f64) -> f64) -> f64 {
@@ -162,7 +162,7 @@ mod tests {
 
     #[test]
     fn functions_are_good_to_the_last_bits() {
-        let level = Level::new();
+        let (_, level) = chosen().unwrap();
         let of = |x: [f32; LANES]| dispatch!(level, simd => exp2(simd, f32x8::load_array(simd, x)).to_array());
         assert!(worst(-126.0, 10.0, of, |x| x.exp2()) < 3e-7);
         let of = |x: [f32; LANES]| dispatch!(level, simd => saturation(simd, f32x8::load_array(simd, x)).to_array());

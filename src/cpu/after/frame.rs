@@ -3,8 +3,8 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicU8, Ordering};
 
+use fearless_simd::Level;
 use fearless_simd::prelude::*;
-use fearless_simd::{Level, dispatch};
 use glam::{DVec3, UVec3};
 
 use super::extreme::is_choice;
@@ -23,6 +23,7 @@ use crate::cpu::frame::{Drawing, Host, Outputs, Tile, draw_tiles};
 use crate::cpu::resolve;
 use crate::cpu::shade::Shader;
 use crate::cpu::sheets::{COLUMNS, ROWS};
+use crate::cpu::simd::dispatch;
 use crate::geometry::pixel_ray::counted;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::lists::brick;

@@ -278,11 +278,11 @@ fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
-    use fearless_simd::{Level, dispatch};
     use glam::{DVec2, DVec4, UVec3};
 
     use super::*;
     use crate::cpu::after::colors::Colors;
+    use crate::cpu::simd::{chosen, dispatch};
     use crate::geometry::plane_geometry::PlaneGeometry;
     use crate::geometry::view_geometry::ViewGeometry;
     use crate::reference::after as twin;
@@ -330,7 +330,7 @@ mod tests {
             for lane in 0..8 {
                 let at = points.of(lane, 0);
                 let of = (points, low_pass);
-                let (number, [gradient, kept]) = dispatch!(Level::new(), simd => {
+                let (number, [gradient, kept]) = dispatch!(chosen().unwrap().1, simd => {
                     let mut weights = Weights::new();
                     let numbers = ours.values(simd, &of, [0, 0], 1 << lane, &mut weights);
                     let gradient = |field: &Field<'_>, weights: &mut Weights| {
@@ -440,7 +440,7 @@ mod tests {
                     continue;
                 }
                 let expected = theirs.color(at, &twins).unwrap();
-                let actual = dispatch!(Level::new(), simd => ours.color(simd, (at, &low_pass)));
+                let actual = dispatch!(chosen().unwrap().1, simd => ours.color(simd, (at, &low_pass)));
                 largest = largest.max((DVec4::from(actual.map(f64::from)) - expected).abs().max_element());
                 count += 1;
             }
