@@ -10,11 +10,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::VolumeError;
 use super::address;
+use super::error::volume::{invalid, io_error};
 use super::file::{BytesRead, Files};
 use super::memory;
 use super::seek::{Located, Notes};
 use super::series::Selection;
-use super::source::{Source, invalid, io_error};
+use super::source::Source;
 
 /// Options for reading volumes, labels and scenes. By default files may lie anywhere.
 ///

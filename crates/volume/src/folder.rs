@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use super::VolumeError;
 use super::access::Access;
-use super::source::io_error;
+use super::error::volume::io_error;
 
 /// The first bytes of a file.
 pub(super) fn head(path: &Path, access: &Access) -> Result<Vec<u8>, VolumeError> {

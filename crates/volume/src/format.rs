@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 
 use super::access::Access;
+use super::error::volume::invalid;
 use super::loaded::Loaded;
 use super::seek::FileStore;
-use super::source::invalid;
 use super::store::Store;
 use super::voxel::Voxel;
 use super::{Grid, VolumeError, folder, nrrd};

@@ -58,6 +58,7 @@ mod shear;
 mod source;
 mod store;
 mod streamed;
+mod text;
 #[cfg(feature = "tiff")]
 mod tiff;
 mod unit;
@@ -89,6 +90,7 @@ pub use counts::StoreCounts;
 pub use display::ChannelDisplay;
 pub use error::setting::{Allowed, Found, Interval, SettingError};
 pub use error::volume::VolumeError;
+use error::volume::refused;
 pub use file::{BytesRead, Files};
 pub use grid::Grid;
 use grid::check_spacing;
@@ -145,15 +147,6 @@ pub struct Encoding {
     pub channels: u32,
     /// The number of times in the file, of which the volume is one.
     pub times: u32,
-}
-
-/// The error for an invalid grid.
-fn refused(origin: &str, error: SettingError) -> VolumeError {
-    invalid(origin, &error.key, error.found.to_string(), error.allowed.to_string())
-}
-
-fn invalid(origin: &str, field: &str, found: String, allowed: String) -> VolumeError {
-    VolumeError::Invalid { origin: origin.to_owned(), field: field.to_owned(), found, allowed }
 }
 
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
@@ -247,7 +240,7 @@ impl Volume {
         values: impl Into<Values>,
     ) -> Result<Self, VolumeError> {
         let values: Values = values.into();
-        let invalid = |field: &str, found: String, allowed: &str| invalid(origin, field, found, allowed.to_owned());
+        let invalid = |field: &str, found: String, allowed: &str| VolumeError::invalid(origin, field, found, allowed);
         let grid = Grid::new(dims, spacing);
         grid.check().map_err(|error| refused(origin, error))?;
         let count = dims.element_product();

@@ -15,7 +15,8 @@ use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
 use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
-use super::source::{MAX_HEADER, Source, number, shown, three};
+use super::source::{MAX_HEADER, Source};
+use super::text::{number, shown, three};
 use super::unit::unit;
 use super::voxel::Voxel;
 

@@ -8,11 +8,11 @@ use glam::{DMat3, DVec3};
 
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::{invalid, io_error};
 use super::loaded::Loaded;
 use super::orientation::Orientation;
 use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::shear::{self, Lattice};
-use super::source::{invalid, io_error};
 use super::voxel::Voxel;
 
 /// The size of the header in bytes.

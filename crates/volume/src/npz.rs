@@ -4,13 +4,13 @@ use std::path::Path;
 
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::invalid;
 #[cfg(feature = "npy")]
 use super::format::archive_and_inner;
 use super::loaded::Loaded;
 use super::npy;
-use super::source::invalid;
 #[cfg(feature = "npy")]
-use super::source::shown;
+use super::text::shown;
 use super::voxel::Voxel;
 use super::zip::Directory;
 #[cfg(feature = "npy")]

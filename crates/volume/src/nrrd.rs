@@ -11,6 +11,7 @@ use glam::{DMat3, DVec3, UVec3};
 use super::VolumeError;
 use super::access::Access;
 use super::data_files::DataFiles;
+use super::error::volume::{invalid, io_error};
 use super::fields::Fields;
 use super::loaded::Loaded;
 use super::numbers::TextEnd;
@@ -18,7 +19,8 @@ use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
-use super::source::{MAX_HEADER, Source, invalid, io_error, lower, number, shown, three, vector};
+use super::source::{MAX_HEADER, Source};
+use super::text::{lower, number, shown, three, vector};
 use super::unit;
 use super::voxel::Voxel;
 

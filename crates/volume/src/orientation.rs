@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Volume, VolumeError, invalid};
+use super::{Volume, VolumeError};
 
 /// The maximum cosine of an angle that counts as a right angle.
 pub(super) const MAX_COSINE: f64 = 1e-4;
@@ -79,7 +79,7 @@ impl Volume {
             let excess = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
             if !(first.is_finite() && excess.iter().all(|excess| excess.abs() <= 2.0 * MAX_COSINE)) {
                 let allowed = "finite orthogonal unit vectors and a finite origin".to_owned();
-                return Err(invalid(
+                return Err(VolumeError::invalid(
                     origin,
                     "orientation",
                     format!("{:?}, {first:?}", axes.to_cols_array_2d()),

@@ -5,8 +5,8 @@ use std::path::Path;
 use glam::{DVec3, UVec3};
 
 use super::access::{Access, ReadOptions};
+use super::error::volume::invalid;
 use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
-use super::source::invalid;
 use super::{Encoding, Volume, VolumeError};
 
 /// The format's name.

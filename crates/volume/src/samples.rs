@@ -16,9 +16,10 @@ use flate2::bufread::ZlibDecoder;
 use glam::{DVec3, UVec3, Vec3Swizzles};
 
 use super::access::Access;
+use super::error::volume::{invalid, io_error};
 use super::file::File;
 use super::numbers::{Numbers, TextEnd};
-use super::source::{CHUNK, Source, invalid, io_error};
+use super::source::{CHUNK, Source};
 use super::voxel::{Many, Voxel};
 use super::{Grid, VolumeError};
 

@@ -9,10 +9,10 @@ use glam::{DVec3, UVec3};
 
 use super::access::Access;
 use super::colors::{COLOR_BYTES, luminance, texel};
+use super::error::volume::{invalid, io_error};
 use super::loaded::Loaded;
 use super::samples::Samples;
 use super::series::{Series, SeriesOrder};
-use super::source::{invalid, io_error};
 use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel, values_of};
 use super::voxel::Voxel;
 use super::{Grid, StoreFacts, Texel, VolumeError};

@@ -6,9 +6,9 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::VolumeError;
+use super::error::volume::invalid;
 use super::samples::{Samples, Stream, dims_of};
 use super::seek::Located;
-use super::source::invalid;
 use super::voxel::{Many, Voxel};
 
 /// The maximum number of channels in a file.

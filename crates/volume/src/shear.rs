@@ -11,10 +11,10 @@ use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::invalid;
 use super::loaded::Loaded;
 use super::orientation::{MAX_COSINE, lengths_and_directions};
 use super::samples::dims_of;
-use super::source::invalid;
 use super::voxel::{Many, Voxel};
 use crate::parallel::prelude::*;
 

@@ -1,15 +1,13 @@
-//! Files that are being read, and the wording of errors about them.
+//! Files that are being read.
 
-use std::fmt::Display;
 use std::fs;
-use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::{invalid, io_error};
 use super::file::File;
 
 /// The maximum length of a header line in bytes.
@@ -95,37 +93,4 @@ impl Source {
         }
         Ok(())
     }
-}
-
-pub(super) fn invalid(path: &Path, field: &str, found: impl Display, allowed: impl Display) -> VolumeError {
-    super::invalid(&path.display().to_string(), field, found.to_string(), allowed.to_string())
-}
-
-pub(super) fn io_error(path: &Path) -> impl Fn(io::Error) -> VolumeError {
-    |source| VolumeError::Io { path: path.to_owned(), source }
-}
-
-/// Text from a file, shortened and on one line.
-pub(super) fn shown(text: &str) -> String {
-    let short: String = text.chars().take(60).collect();
-    format!("{short:?}{}", if short.len() < text.len() { "…" } else { "" })
-}
-
-pub(super) fn lower(text: &str) -> String {
-    text.to_ascii_lowercase()
-}
-
-pub(super) fn three<T>(items: impl Iterator<Item = Option<T>>) -> Option<[T; 3]> {
-    items.collect::<Option<Vec<T>>>()?.try_into().ok()
-}
-
-/// A finite number.
-pub(super) fn number(text: &str) -> Option<f64> {
-    text.trim().parse().ok().filter(|number: &f64| number.is_finite())
-}
-
-/// A vector `(x,y,z)`, with or without spaces around the numbers.
-pub(super) fn vector(text: &str) -> Option<DVec3> {
-    let components = text.trim().strip_prefix('(')?.strip_suffix(')')?;
-    three(components.split(',').map(number)).map(DVec3::from_array)
 }

@@ -8,12 +8,12 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3};
 
 use super::access::{Access, ReadOptions};
+use super::error::volume::invalid;
 use super::format;
 use super::raw;
 use super::samples::{SIZES, Samples, dims_of};
 use super::seek::{FileStore, Located};
 use super::series::Series;
-use super::source::invalid;
 use super::{ChannelDisplay, Encoding, Grid, Orientation, RawLayout, Texel, VolumeError};
 
 /// A volume that is read by boxes (SPEC §13): one channel at one time.

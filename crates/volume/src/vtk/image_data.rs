@@ -11,13 +11,14 @@ use quick_xml::events::Event;
 
 use super::super::VolumeError;
 use super::super::access::Access;
+use super::super::error::volume::{invalid, io_error};
 use super::super::fields::Fields;
 use super::super::loaded::Loaded;
 use super::super::numbers::TextEnd;
 use super::super::orientation::unit_directions;
 use super::super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
 use super::super::series::{MAX_CHANNELS, Series, SeriesOrder};
-use super::super::source::{invalid, io_error, number, three};
+use super::super::text::{number, three};
 use super::super::voxel::Voxel;
 use super::super::xml;
 use super::blocks::{Base64, Blocks, Compressor, HeaderType};
