@@ -7,7 +7,7 @@ use glam::{DVec3, UVec3};
 
 use super::display::ChannelDisplay;
 use super::error::volume::invalid;
-use super::samples::SampleType;
+use super::sample_type::SampleType;
 use super::series::Series;
 use super::voxel::{Many, Voxel};
 use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};

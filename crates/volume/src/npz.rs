@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::VolumeError;
 use super::access::Access;
-use super::error::volume::invalid;
 #[cfg(feature = "npy")]
-use super::format::archive_and_inner;
+use super::address::archive_and_inner;
+use super::error::volume::invalid;
 use super::loaded::Loaded;
 use super::npy;
 #[cfg(feature = "npy")]

@@ -189,7 +189,7 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    use crate::{RawLayout, ReadOptions, SampleType, store::open_raw_store};
+    use crate::{RawLayout, ReadOptions, SampleType, open_raw_store};
 
     #[test]
     fn samples_lie_where_the_store_does() {

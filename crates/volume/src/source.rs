@@ -17,6 +17,22 @@ pub(super) const MAX_HEADER: u64 = 1 << 20;
 /// The number of bytes read at a time: a multiple of the size of every sample type.
 pub(super) const CHUNK: u64 = 64 << 10;
 
+impl Access {
+    pub(super) fn open(&self, path: &Path) -> Result<Source, VolumeError> {
+        let source = self.open_to_look(path)?;
+        self.note_open(path);
+        Ok(source)
+    }
+
+    /// Opens a file only to determine its format.
+    pub(super) fn open_to_look(&self, path: &Path) -> Result<Source, VolumeError> {
+        match self.given() {
+            Some(files) => Ok(Source::in_memory(path, files.get(path).map_err(io_error(path))?, self)),
+            None => Source::open(path, &self.resolve(path)?, self),
+        }
+    }
+}
+
 /// A file that is being read.
 pub(super) struct Source {
     pub(super) path: PathBuf,
@@ -27,7 +43,7 @@ pub(super) struct Source {
 
 impl Source {
     /// Opens `path` at `resolved`, the place it leads to. [`Access::open`] does both.
-    pub(super) fn open(path: &Path, resolved: &Path, access: &Access) -> Result<Self, VolumeError> {
+    fn open(path: &Path, resolved: &Path, access: &Access) -> Result<Self, VolumeError> {
         // The kind of file is checked before opening, because opening a pipe would wait for its writer.
         let metadata = fs::metadata(resolved).map_err(io_error(path))?;
         if !metadata.is_file() {
@@ -38,7 +54,7 @@ impl Source {
     }
 
     /// Opens a file that is in memory.
-    pub(super) fn in_memory(path: &Path, bytes: &Arc<[u8]>, access: &Access) -> Self {
+    fn in_memory(path: &Path, bytes: &Arc<[u8]>, access: &Access) -> Self {
         Self::new(path, bytes.len() as u64, File::in_memory(bytes, access.bytes_read()), access)
     }
 

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use glam::UVec3;
 
 use super::adapted::{AdaptedStore, Tally};
+use super::labels::labels_of;
 use super::resample::{Oriented, is_same_grid};
 use super::sample::{parts_of, sample_at, spread};
-use super::{ChunkProgress, Grid, IndexedStore, Labels, Store, StoreIndex, Volume, VolumeError, labels_of};
+use super::{ChunkProgress, Grid, IndexedStore, Labels, Store, StoreIndex, Volume, VolumeError};
 use crate::StoreCounts;
 
 /// A volume that is drawn without being in memory as a whole (SPEC §13): one channel or several on one grid, each with labels or without.

@@ -12,8 +12,8 @@ use flate2::bufread::DeflateDecoder;
 
 use super::VolumeError;
 use super::error::volume::{invalid, io_error};
-use super::samples::{MAX_EXPANSION, Stream};
 use super::source::Source;
+use super::stream::{MAX_EXPANSION, Stream};
 
 /// The size of the directory's end record without its comment, and the maximum length of the comment.
 const END: u64 = 22;

@@ -13,7 +13,7 @@ use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::display::ChannelDisplay;
 use super::super::error::volume::{invalid, io_error};
-use super::super::samples::SampleType;
+use super::super::sample_type::SampleType;
 use super::directory::{low_byte_of, most_values, overlong_entry};
 use super::display;
 use super::overlay::Overlay;
