@@ -10,11 +10,11 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::VolumeError;
 use super::address;
+use super::error::volume::{invalid, io_error};
 use super::file::{BytesRead, Files};
+use super::located::{Located, Notes};
 use super::memory;
-use super::seek::{Located, Notes};
 use super::series::Selection;
-use super::source::{Source, invalid, io_error};
 
 /// Options for reading volumes, labels and scenes. By default files may lie anywhere.
 ///
@@ -265,18 +265,9 @@ impl Access {
         }
     }
 
-    pub(super) fn open(&self, path: &Path) -> Result<Source, VolumeError> {
-        let source = self.open_to_look(path)?;
+    /// Notes that a file is opened, not only to determine its format.
+    pub(super) fn note_open(&self, path: &Path) {
         self.0.files.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned());
-        Ok(source)
-    }
-
-    /// Opens a file only to determine its format.
-    pub(super) fn open_to_look(&self, path: &Path) -> Result<Source, VolumeError> {
-        match self.given() {
-            Some(files) => Ok(Source::in_memory(path, files.get(path).map_err(io_error(path))?, self)),
-            None => Source::open(path, &self.resolve(path)?, self),
-        }
     }
 
     /// The files opened so far, without those of which only the format was determined.

@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use glam::{DVec3, UVec3};
 
+use super::error::volume::refused;
 use super::grid::check_spacing;
-use super::{Store, StoreFacts, StoreLevel, Texel, VolumeError, refused};
+use super::{Store, StoreFacts, StoreLevel, Texel, VolumeError};
 
 /// A function that is told how many chunks of a level have been read, and how many there are.
 pub type ChunkProgress = dyn Fn(u64, u64) + Send + Sync;

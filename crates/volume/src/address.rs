@@ -1,4 +1,4 @@
-//! Addresses of stores that are read over HTTP, which stand where paths do.
+//! Paths that name more than a file: addresses of stores that are read over HTTP, and files in archives.
 
 use std::path::{Path, PathBuf};
 
@@ -12,6 +12,17 @@ pub fn is_address(path: &Path) -> bool {
 /// A path that is written in a folder: one that is relative leads from there, an address does not.
 pub fn written_in(folder: &Path, path: &str) -> PathBuf {
     if is_address(Path::new(path)) { PathBuf::from(path) } else { folder.join(path) }
+}
+
+/// The parts of a path such as `file.npz:name` before and after the colon, for archives of several volumes; any other path is the first part.
+pub(super) fn archive_and_inner(path: &Path) -> (&Path, Option<&str>) {
+    const EXTENSIONS: [&str; 3] = [".npz:", ".zip:", ".ozx:"];
+    let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {
+        let lower = text.to_ascii_lowercase();
+        let at = EXTENSIONS.iter().filter_map(|end| Some(lower.rfind(end)? + end.len())).max()?;
+        Some((Path::new(&text[..at - 1]), Some(&text[at..])))
+    });
+    split.unwrap_or((path, None))
 }
 
 #[cfg(test)]

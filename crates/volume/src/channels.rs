@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Volume, VolumeError, invalid};
+use super::{Volume, VolumeError};
 
 impl Volume {
     /// The same volume with other further channels, which lie on its grid and take its spacing. `origin` names the volumes in errors.
@@ -14,11 +14,11 @@ impl Volume {
             let key = format!("channel[{number}]");
             if channel.dims() != self.dims() {
                 let allowed = format!("{}, those of channel[0]", self.dims());
-                return Err(invalid(origin, &key, format!("the sizes {}", channel.dims()), allowed));
+                return Err(VolumeError::invalid(origin, &key, format!("the sizes {}", channel.dims()), allowed));
             }
             if !channel.further.is_empty() {
                 let found = format!("a volume of {} channels", channel.channels().count());
-                return Err(invalid(origin, &key, found, "a volume of one channel".to_owned()));
+                return Err(VolumeError::invalid(origin, &key, found, "a volume of one channel".to_owned()));
             }
         }
         let grid = self.grid;

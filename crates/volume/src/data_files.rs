@@ -6,8 +6,9 @@ use glam::UVec3;
 
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::invalid;
 use super::samples::Samples;
-use super::source::{Source, invalid};
+use super::source::Source;
 use super::voxel::{Many, Voxel};
 
 /// The maximum width of a number in a file's name.

@@ -2,8 +2,6 @@
 
 use glam::DVec3;
 
-use super::Volume;
-
 /// A channel's colours and its window, as far as its file states them.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -12,17 +10,4 @@ pub struct ChannelDisplay {
     pub colors: Vec<DVec3>,
     /// The values that are shown darkest and brightest.
     pub window: Option<[f64; 2]>,
-}
-
-impl Volume {
-    /// How the file says that the channel is shown; `None` if it says nothing.
-    pub fn display(&self) -> Option<&ChannelDisplay> {
-        self.display.as_ref()
-    }
-
-    /// The same volume with another way to show its first channel.
-    pub fn with_display(mut self, display: Option<ChannelDisplay>) -> Self {
-        self.display = display;
-        self
-    }
 }

@@ -5,7 +5,8 @@ use std::fmt::Display;
 use std::path::PathBuf;
 
 use super::VolumeError;
-use super::source::{invalid, shown};
+use super::error::volume::invalid;
+use super::text::shown;
 
 /// A header's fields, each at most once.
 pub(super) struct Fields {

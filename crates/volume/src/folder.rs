@@ -1,19 +1,11 @@
 //! Folders of slices.
 
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::VolumeError;
 use super::access::Access;
-use super::source::io_error;
-
-/// The first bytes of a file.
-pub(super) fn head(path: &Path, access: &Access) -> Result<Vec<u8>, VolumeError> {
-    let mut head = Vec::new();
-    access.open_to_look(path)?.reader.take(1024).read_to_end(&mut head).map_err(io_error(path))?;
-    Ok(head)
-}
+use super::error::volume::io_error;
 
 /// The files in a folder, without those of its subfolders, in natural order.
 pub(super) fn files(folder: &Path, access: &Access) -> Result<Vec<PathBuf>, VolumeError> {

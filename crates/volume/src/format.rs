@@ -5,9 +5,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError};
 
 use super::access::Access;
+use super::address::archive_and_inner;
+use super::error::volume::invalid;
+use super::head::{head, is_bare_dicom};
 use super::loaded::Loaded;
 use super::seek::FileStore;
-use super::source::invalid;
 use super::store::Store;
 use super::voxel::Voxel;
 use super::{Grid, VolumeError, folder, nrrd};
@@ -212,7 +214,7 @@ fn format_at<'a, T: Voxel>(
         let is_store = is_zarr(file, access)?;
         return Ok(formats.iter().find(|format| format.name == ZARR && is_store));
     }
-    let head = folder::head(file, access)?;
+    let head = head(file, access)?;
     Ok(format_of(formats, file, &head).map(|(format, _)| format))
 }
 
@@ -242,14 +244,6 @@ fn format_of<'a, T: Voxel>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -
     formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
 }
 
-/// Whether a file begins as DICOM files without the preamble of 128 bytes and "DICM" do: with an element of group 2 or 8, and its type
-/// or an even length.
-pub(super) fn is_bare_dicom(head: &[u8]) -> bool {
-    let &[group @ (2 | 8), 0, 0..=0x70, 0, a, b, c, d, ..] = head else { return false };
-    let has_type = a.is_ascii_uppercase() && b.is_ascii_uppercase();
-    has_type || group == 8 && a % 2 == 0 && [b, c, d] == [0; 3]
-}
-
 fn read_folder<T: Voxel>(
     path: &Path,
     access: &Access,
@@ -261,7 +255,7 @@ fn read_folder<T: Voxel>(
     let is_of_slices = |format: &Format<T>| SLICES.contains(&format.name);
     let mut left_out = Vec::new();
     for file in files {
-        let head = folder::head(&file, access)?;
+        let head = head(&file, access)?;
         let format = match format_of(formats, &file, &head) {
             Some((format, true)) if is_of_slices(format) => format,
             other => {
@@ -296,17 +290,6 @@ fn read_folder<T: Voxel>(
     };
     let allowed = format!("a volume file, or a folder with the slices of one volume, {}", SLICES.join(" or "));
     Err(invalid(path, "folder", found, allowed))
-}
-
-/// The parts of a path such as `file.npz:name` before and after the colon, for archives of several volumes; any other path is the first part.
-pub(super) fn archive_and_inner(path: &Path) -> (&Path, Option<&str>) {
-    const EXTENSIONS: [&str; 3] = [".npz:", ".zip:", ".ozx:"];
-    let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {
-        let lower = text.to_ascii_lowercase();
-        let at = EXTENSIONS.iter().filter_map(|end| Some(lower.rfind(end)? + end.len())).max()?;
-        Some((Path::new(&text[..at - 1]), Some(&text[at..])))
-    });
-    split.unwrap_or((path, None))
 }
 
 fn needs(name: &str, feature: &str) -> String {

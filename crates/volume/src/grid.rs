@@ -25,6 +25,16 @@ pub fn check_spacing(key: &str, spacing: DVec3) -> Result<(), SettingError> {
     Ok(())
 }
 
+/// The dimensions of a grid, if each is at least 1 and the number of voxels fits in 32 bits.
+pub fn dims_of<N: TryInto<u32>>(sizes: [N; 3]) -> Option<UVec3> {
+    let [Ok(x), Ok(y), Ok(z)] = sizes.map(TryInto::try_into) else { return None };
+    let voxels = x.checked_mul(y)?.checked_mul(z)?;
+    (voxels > 0).then_some(UVec3::new(x, y, z))
+}
+
+/// What [`dims_of`] accepts, for errors.
+pub const SIZES: &str = "three positive integers, at most 4294967295 voxels";
+
 /// A rectilinear grid (SPEC §2) whose centre is the world's origin, or, of a coarser level (SPEC §13), where its level lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grid {

@@ -145,7 +145,7 @@ fn invalid_in(
     found: impl Into<String>,
     allowed: impl Into<String>,
 ) -> VolumeError {
-    super::invalid(origin, field.as_ref(), found.into(), allowed.into())
+    VolumeError::invalid(origin, field.as_ref(), found, allowed)
 }
 
 /// The number of chunks, which may be more than 64 bits hold where metadata lie.

@@ -10,7 +10,7 @@ use super::access::{Access, ReadOptions};
 use super::format;
 use super::loaded::Loaded;
 use super::voxel::Voxel;
-use super::{Grid, Volume, VolumeError, invalid};
+use super::{Grid, Volume, VolumeError};
 
 /// Spacings whose relative difference is less than this count as equal.
 const SAME_SPACING: f64 = 1e-4;
@@ -69,7 +69,7 @@ pub fn labels_of(
     let label = |(index, value): (u32, f32)| {
         u16::of(value).ok_or_else(|| {
             let voxel = from + step * Grid::new(dims, DVec3::ONE).voxel_at(index);
-            invalid(origin, "data", format!("{value} at voxel {voxel}"), u16::ALLOWED.to_owned())
+            VolumeError::invalid(origin, "data", format!("{value} at voxel {voxel}"), u16::ALLOWED.to_owned())
         })
     };
     (0..).zip(values).map(label).collect()
@@ -84,18 +84,28 @@ impl Volume {
         let Labels { origin, dims, spacing, values, names } = labels;
         let shown = |spacing: DVec3| format!("{:?}", spacing.to_array());
         if dims != self.dims() {
-            return Err(invalid(&origin, "sizes", format!("{dims}"), format!("{}, the volume's", self.dims())));
+            return Err(VolumeError::invalid(
+                &origin,
+                "sizes",
+                format!("{dims}"),
+                format!("{}, the volume's", self.dims()),
+            ));
         }
         let (found, allowed) = (values.len(), self.values().len());
         if found != allowed {
-            return Err(invalid(&origin, "data", format!("{found} labels"), format!("{allowed} labels")));
+            return Err(VolumeError::invalid(&origin, "data", format!("{found} labels"), format!("{allowed} labels")));
         }
         let differs = |spacing: &DVec3| {
             let largest = spacing.max(self.spacing());
             !(*spacing - self.spacing()).abs().cmple(SAME_SPACING * largest).all()
         };
         if let Some(other) = spacing.filter(differs) {
-            return Err(invalid(&origin, "spacing", shown(other), format!("{}, the volume's", shown(self.spacing()))));
+            return Err(VolumeError::invalid(
+                &origin,
+                "spacing",
+                shown(other),
+                format!("{}, the volume's", shown(self.spacing())),
+            ));
         }
         self.labels = Some(values);
         self.label_names = names;

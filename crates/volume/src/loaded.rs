@@ -6,9 +6,9 @@ use std::path::Path;
 use glam::{DVec3, UVec3};
 
 use super::display::ChannelDisplay;
-use super::samples::SampleType;
+use super::error::volume::invalid;
+use super::sample_type::SampleType;
 use super::series::Series;
-use super::source::invalid;
 use super::voxel::{Many, Voxel};
 use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
 use crate::StoreCounts;

@@ -11,11 +11,15 @@ use super::VolumeError;
 use super::access::Access;
 use super::data_files::DataFiles;
 use super::fields::Fields;
+use super::grid::{SIZES, dims_of};
 use super::loaded::Loaded;
 use super::orientation::{Orientation, RAS_FROM_LPS, unit_directions};
-use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
+use super::sample_type::SampleType;
+use super::samples::Samples;
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
-use super::source::{MAX_HEADER, Source, number, shown, three};
+use super::source::{MAX_HEADER, Source};
+use super::stream::Stream;
+use super::text::{number, shown, three};
 use super::unit::unit;
 use super::voxel::Voxel;
 

@@ -12,12 +12,15 @@ use glam::{DMat3, DQuat, DVec3, UVec3};
 
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::{invalid, io_error};
+use super::grid::{SIZES, dims_of};
 use super::loaded::Loaded;
 use super::orientation::Orientation;
-use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
+use super::sample_type::SampleType;
+use super::samples::Samples;
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
-use super::source::{invalid, io_error};
+use super::stream::Stream;
 use super::voxel::Voxel;
 
 /// The format's codes of data types, and the bits of each.

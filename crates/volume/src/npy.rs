@@ -11,10 +11,15 @@ use glam::UVec3;
 
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::invalid;
+use super::grid::{SIZES, dims_of};
 use super::loaded::Loaded;
-use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
+use super::sample_type::SampleType;
+use super::samples::Samples;
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
-use super::source::{MAX_HEADER, invalid, shown};
+use super::source::MAX_HEADER;
+use super::stream::Stream;
+use super::text::shown;
 use super::voxel::Voxel;
 
 const TYPES: [(&str, SampleType); 10] = [

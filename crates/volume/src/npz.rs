@@ -5,12 +5,12 @@ use std::path::Path;
 use super::VolumeError;
 use super::access::Access;
 #[cfg(feature = "npy")]
-use super::format::archive_and_inner;
+use super::address::archive_and_inner;
+use super::error::volume::invalid;
 use super::loaded::Loaded;
 use super::npy;
-use super::source::invalid;
 #[cfg(feature = "npy")]
-use super::source::shown;
+use super::text::shown;
 use super::voxel::Voxel;
 use super::zip::Directory;
 #[cfg(feature = "npy")]

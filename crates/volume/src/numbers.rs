@@ -2,7 +2,7 @@
 
 use std::io::{self, BufRead, Read};
 
-use super::samples::SampleType;
+use super::sample_type::SampleType;
 
 /// The maximum number of bytes in a number.
 const MAX_TOKEN: usize = 64;

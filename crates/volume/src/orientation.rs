@@ -2,8 +2,6 @@
 
 use glam::{DMat3, DVec3};
 
-use super::{Volume, VolumeError, invalid};
-
 /// The maximum cosine of an angle that counts as a right angle.
 pub(super) const MAX_COSINE: f64 = 1e-4;
 
@@ -61,34 +59,6 @@ impl Orientation {
     /// Whether the volume's axes are left-handed in the patient, so that every image of the volume is mirrored.
     pub fn is_mirrored(&self) -> bool {
         self.axes.determinant() < 0.0
-    }
-}
-
-impl Volume {
-    /// How the volume lies in a patient, if known.
-    pub fn orientation(&self) -> Option<&Orientation> {
-        self.orientation.as_ref()
-    }
-
-    /// The same volume with another orientation, or with an unknown one. `origin` names the volume in errors.
-    ///
-    /// # Errors
-    /// If the axes are not orthogonal unit vectors (to 1 in 10⁴), or a number is not finite.
-    pub fn with_orientation(mut self, origin: &str, orientation: Option<Orientation>) -> Result<Self, VolumeError> {
-        if let Some(Orientation { axes, origin: first }) = orientation {
-            let excess = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
-            if !(first.is_finite() && excess.iter().all(|excess| excess.abs() <= 2.0 * MAX_COSINE)) {
-                let allowed = "finite orthogonal unit vectors and a finite origin".to_owned();
-                return Err(invalid(
-                    origin,
-                    "orientation",
-                    format!("{:?}, {first:?}", axes.to_cols_array_2d()),
-                    allowed,
-                ));
-            }
-        }
-        self.orientation = orientation;
-        Ok(self)
     }
 }
 

@@ -1,12 +1,20 @@
 //! Raw files: samples without a header, whose layout the caller states.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
 use super::access::{Access, ReadOptions};
-use super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
-use super::source::invalid;
+use super::error::volume::invalid;
+use super::grid::{SIZES, dims_of};
+use super::located::Located;
+use super::sample_type::SampleType;
+use super::samples::Samples;
+use super::seek::FileStore;
+use super::series::Series;
+use super::store::{Store, StoreFacts};
+use super::stream::Stream;
 use super::{Encoding, Volume, VolumeError};
 
 /// The format's name.
@@ -56,4 +64,30 @@ impl Volume {
         let volume = Self::from_values(&path.display().to_string(), dims, DVec3::ONE, values)?;
         Ok(Self { encoding: Some(Encoding { format: FORMAT, sample_type: kind, channels: 1, times: 1 }), ..volume })
     }
+}
+
+/// Opens a file of samples without a header to be read by boxes.
+///
+/// # Errors
+/// If the file cannot be read, or is shorter than its layout says.
+pub fn open_raw_store(path: &Path, layout: &RawLayout, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
+    raw_store(path, layout, &Access::new(options)?)
+}
+
+/// As [`open_raw_store`].
+pub fn raw_store(path: &Path, layout: &RawLayout, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
+    let &RawLayout { dims, sample_type: kind, big_endian, offset: at } = layout;
+    let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
+    dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?;
+    let mut file = access.open(path)?;
+    file.skip(at)?;
+    let left = file.left()?;
+    if left != samples.bytes() {
+        return Err(samples.mismatch(path, left));
+    }
+    let located = Located { path: path.to_owned(), at, samples, series: Series::default() };
+    let encoding = Encoding { format: FORMAT, sample_type: kind, channels: 1, times: 1 };
+    let facts = StoreFacts { encoding: Some(encoding), ..StoreFacts::default() };
+    located.series.check(path, access.selection())?;
+    Ok(Arc::new(FileStore::new(located, 0..1, DVec3::ONE, facts, access)?))
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3};
 
 use super::access::Access;
-use super::{Grid, Orientation, Texel, Volume, VolumeError, invalid};
+use super::{Grid, Orientation, Texel, Volume, VolumeError};
 use crate::parallel::prelude::*;
 
 /// Places that differ by less, in voxels, are the same.
@@ -105,7 +105,12 @@ impl Volume {
         if values.iter().all(|value| value.is_nan()) {
             let name = origin.display().to_string();
             let [own, other] = [&self, grid].map(bounds);
-            return Err(invalid(&name, key, own, format!("a box that overlaps the first channel's, {other}")));
+            return Err(VolumeError::invalid(
+                &name,
+                key,
+                own,
+                format!("a box that overlaps the first channel's, {other}"),
+            ));
         }
         let (name, own) = (origin.display(), self.dims());
         let nearest = if resampling == Resampling::Nearest { ", each label the nearest one" } else { "" };

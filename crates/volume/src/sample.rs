@@ -2,7 +2,7 @@
 
 use glam::{DVec3, UVec3};
 
-use super::{Grid, Store, StoreLevel, Texel, Values, Volume, VolumeError, invalid};
+use super::{Grid, Store, StoreLevel, Texel, Values, Volume, VolumeError};
 use crate::StoreCounts;
 use crate::parallel::prelude::*;
 
@@ -62,7 +62,7 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
     let volume = if store.has_colors() { volume.with_texels(colors) } else { volume };
     if volume.holes == count {
         let found = "only NaN or infinite samples".to_owned();
-        return Err(invalid(origin, "data", found, "at least one finite sample".to_owned()));
+        return Err(VolumeError::invalid(origin, "data", found, "at least one finite sample".to_owned()));
     }
     Volume { reads: Some(reads), ..volume }.stating(origin, store.facts())
 }
@@ -189,7 +189,7 @@ mod tests {
     use super::*;
     use std::path::Path;
 
-    use crate::{RawLayout, ReadOptions, SampleType, store::open_raw_store};
+    use crate::{RawLayout, ReadOptions, SampleType, open_raw_store};
 
     #[test]
     fn samples_lie_where_the_store_does() {

@@ -2,18 +2,19 @@
 
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
 use super::access::Access;
-use super::colors::{COLOR_BYTES, luminance, texel};
+use super::error::volume::{invalid, io_error};
 use super::loaded::Loaded;
+use super::located::Located;
 use super::samples::Samples;
-use super::series::{Series, SeriesOrder};
-use super::source::{invalid, io_error};
+use super::series::SeriesOrder;
 use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel, values_of};
+use super::texel::{COLOR_BYTES, luminance, texel};
 use super::voxel::Voxel;
 use super::{Grid, StoreFacts, Texel, VolumeError};
 
@@ -29,19 +30,6 @@ const STRETCH: u64 = 4096;
 /// The bytes between a box's rows in a file up to which rows are read together, and the most bytes that are, if they are several.
 const GAP: u64 = 4096;
 const RUN: u64 = 1 << 20;
-
-/// Where the samples of a file are.
-#[derive(Clone, Debug)]
-pub(super) struct Located {
-    pub(super) path: PathBuf,
-    /// The byte of the first sample.
-    pub(super) at: u64,
-    pub(super) samples: Samples,
-    pub(super) series: Series,
-}
-
-/// What readers note in place of reading samples.
-pub(super) type Notes = Mutex<Vec<Located>>;
 
 /// A file that is read by boxes.
 #[derive(Debug)]

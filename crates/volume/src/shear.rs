@@ -11,10 +11,10 @@ use glam::{DMat3, DVec3, UVec3};
 
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::invalid;
+use super::grid::dims_of;
 use super::loaded::Loaded;
 use super::orientation::{MAX_COSINE, lengths_and_directions};
-use super::samples::dims_of;
-use super::source::invalid;
 use super::voxel::{Many, Voxel};
 use crate::parallel::prelude::*;
 
@@ -243,7 +243,7 @@ fn cell(place: f64, samples: u32) -> Option<(usize, f64)> {
 mod tests {
     use super::super::ReadOptions;
     use super::super::orientation::Orientation;
-    use super::super::samples::SampleType;
+    use super::super::sample_type::SampleType;
     use super::*;
 
     fn loaded<T: Voxel>(dims: UVec3, lattice: &Lattice, origin: DVec3, values: Vec<T>) -> Loaded<T> {

@@ -1,15 +1,13 @@
-//! Files that are being read, and the wording of errors about them.
+//! Files that are being read.
 
-use std::fmt::Display;
 use std::fs;
-use std::io::{self, BufRead, BufReader, Read, Seek};
+use std::io::{BufRead, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::{invalid, io_error};
 use super::file::File;
 
 /// The maximum length of a header line in bytes.
@@ -18,6 +16,22 @@ const MAX_LINE: u64 = 64 << 10;
 pub(super) const MAX_HEADER: u64 = 1 << 20;
 /// The number of bytes read at a time: a multiple of the size of every sample type.
 pub(super) const CHUNK: u64 = 64 << 10;
+
+impl Access {
+    pub(super) fn open(&self, path: &Path) -> Result<Source, VolumeError> {
+        let source = self.open_to_look(path)?;
+        self.note_open(path);
+        Ok(source)
+    }
+
+    /// Opens a file only to determine its format.
+    pub(super) fn open_to_look(&self, path: &Path) -> Result<Source, VolumeError> {
+        match self.given() {
+            Some(files) => Ok(Source::in_memory(path, files.get(path).map_err(io_error(path))?, self)),
+            None => Source::open(path, &self.resolve(path)?, self),
+        }
+    }
+}
 
 /// A file that is being read.
 pub(super) struct Source {
@@ -29,7 +43,7 @@ pub(super) struct Source {
 
 impl Source {
     /// Opens `path` at `resolved`, the place it leads to. [`Access::open`] does both.
-    pub(super) fn open(path: &Path, resolved: &Path, access: &Access) -> Result<Self, VolumeError> {
+    fn open(path: &Path, resolved: &Path, access: &Access) -> Result<Self, VolumeError> {
         // The kind of file is checked before opening, because opening a pipe would wait for its writer.
         let metadata = fs::metadata(resolved).map_err(io_error(path))?;
         if !metadata.is_file() {
@@ -40,7 +54,7 @@ impl Source {
     }
 
     /// Opens a file that is in memory.
-    pub(super) fn in_memory(path: &Path, bytes: &Arc<[u8]>, access: &Access) -> Self {
+    fn in_memory(path: &Path, bytes: &Arc<[u8]>, access: &Access) -> Self {
         Self::new(path, bytes.len() as u64, File::in_memory(bytes, access.bytes_read()), access)
     }
 
@@ -95,37 +109,4 @@ impl Source {
         }
         Ok(())
     }
-}
-
-pub(super) fn invalid(path: &Path, field: &str, found: impl Display, allowed: impl Display) -> VolumeError {
-    super::invalid(&path.display().to_string(), field, found.to_string(), allowed.to_string())
-}
-
-pub(super) fn io_error(path: &Path) -> impl Fn(io::Error) -> VolumeError {
-    |source| VolumeError::Io { path: path.to_owned(), source }
-}
-
-/// Text from a file, shortened and on one line.
-pub(super) fn shown(text: &str) -> String {
-    let short: String = text.chars().take(60).collect();
-    format!("{short:?}{}", if short.len() < text.len() { "…" } else { "" })
-}
-
-pub(super) fn lower(text: &str) -> String {
-    text.to_ascii_lowercase()
-}
-
-pub(super) fn three<T>(items: impl Iterator<Item = Option<T>>) -> Option<[T; 3]> {
-    items.collect::<Option<Vec<T>>>()?.try_into().ok()
-}
-
-/// A finite number.
-pub(super) fn number(text: &str) -> Option<f64> {
-    text.trim().parse().ok().filter(|number: &f64| number.is_finite())
-}
-
-/// A vector `(x,y,z)`, with or without spaces around the numbers.
-pub(super) fn vector(text: &str) -> Option<DVec3> {
-    let components = text.trim().strip_prefix('(')?.strip_suffix(')')?;
-    three(components.split(',').map(number)).map(DVec3::from_array)
 }

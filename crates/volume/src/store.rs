@@ -3,18 +3,11 @@
 use std::collections::BTreeMap;
 use std::fmt::Debug;
 use std::path::Path;
-use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
-use super::access::{Access, ReadOptions};
-use super::format;
-use super::raw;
-use super::samples::{SIZES, Samples, dims_of};
-use super::seek::{FileStore, Located};
-use super::series::Series;
-use super::source::invalid;
-use super::{ChannelDisplay, Encoding, Grid, Orientation, RawLayout, Texel, VolumeError};
+use super::error::volume::invalid;
+use super::{ChannelDisplay, Encoding, Grid, Orientation, Texel, VolumeError};
 
 /// A volume that is read by boxes (SPEC §13): one channel at one time.
 ///
@@ -135,64 +128,12 @@ impl StoreLevel {
     }
 }
 
-/// Opens a volume to be read by boxes: an OME-Zarr image or a Zarr array, or an uncompressed NRRD, NIfTI, MetaImage or NPY file. Of a file with several channels the options choose one; of several times they may.
-///
-/// # Errors
-/// If the file cannot be read, is of no such format, holds several channels of which none is chosen, or needs more memory than
-/// [`ReadOptions::memory`] allows for the chunks that are read at once.
-pub fn open_store(path: &Path, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
-    store(path, &Access::new(options)?)
-}
-
-/// As [`open_store`].
-pub fn store(path: &Path, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
-    let mut stores = stores(path, access)?;
-    match (stores.len(), stores.pop()) {
-        (1, Some(store)) => Ok(store),
-        (count, _) => {
-            let allowed = format!("the number of one of them, 0 to {}", count.saturating_sub(1));
-            Err(invalid(path, "channels", count, allowed))
-        }
-    }
-}
-
-/// Opens the channels of a volume that are selected, each to be read by boxes; otherwise as [`open_store`].
-pub fn stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
-    format::open_stores(path, access)
-}
-
 /// What a file states about one of its channels, given its number among those that are read: what concerns all of them is the first one's.
 pub(super) fn facts_of_channel(facts: StoreFacts, number: usize) -> StoreFacts {
     match number {
         0 => facts,
         _ => StoreFacts { palette: None, label_names: BTreeMap::new(), orientation: None, ..facts },
     }
-}
-
-/// Opens a file of samples without a header to be read by boxes.
-///
-/// # Errors
-/// If the file cannot be read, or is shorter than its layout says.
-pub fn open_raw_store(path: &Path, layout: &RawLayout, options: &ReadOptions) -> Result<Arc<dyn Store>, VolumeError> {
-    raw_store(path, layout, &Access::new(options)?)
-}
-
-/// As [`open_raw_store`].
-pub fn raw_store(path: &Path, layout: &RawLayout, access: &Access) -> Result<Arc<dyn Store>, VolumeError> {
-    let &RawLayout { dims, sample_type: kind, big_endian, offset: at } = layout;
-    let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
-    dims_of(dims.to_array()).ok_or_else(|| invalid(path, "sizes", dims, SIZES))?;
-    let mut file = access.open(path)?;
-    file.skip(at)?;
-    let left = file.left()?;
-    if left != samples.bytes() {
-        return Err(samples.mismatch(path, left));
-    }
-    let located = Located { path: path.to_owned(), at, samples, series: Series::default() };
-    let encoding = Encoding { format: raw::FORMAT, sample_type: kind, channels: 1, times: 1 };
-    let facts = StoreFacts { encoding: Some(encoding), ..StoreFacts::default() };
-    located.series.check(path, access.selection())?;
-    Ok(Arc::new(FileStore::new(located, 0..1, DVec3::ONE, facts, access)?))
 }
 
 /// Checks that a box lies in a level, and that there is a value for each of its voxels.

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use glam::UVec3;
 
 use super::adapted::{AdaptedStore, Tally};
+use super::labels::labels_of;
 use super::resample::{Oriented, is_same_grid};
 use super::sample::{parts_of, sample_at, spread};
-use super::{ChunkProgress, Grid, IndexedStore, Labels, Store, StoreIndex, Volume, VolumeError, invalid, labels_of};
+use super::{ChunkProgress, Grid, IndexedStore, Labels, Store, StoreIndex, Volume, VolumeError};
 use crate::StoreCounts;
 
 /// A volume that is drawn without being in memory as a whole (SPEC §13): one channel or several on one grid, each with labels or without.
@@ -67,7 +68,7 @@ impl StreamedLevel {
         if self.level < levels {
             return Ok(());
         }
-        Err(invalid(&self.origin, "level", self.level.to_string(), format!("0 to {}", levels - 1)))
+        Err(VolumeError::invalid(&self.origin, "level", self.level.to_string(), format!("0 to {}", levels - 1)))
     }
 
     /// The number of the level whose voxels lie on those of a grid, which counts as lying where the finest level does.
@@ -251,7 +252,7 @@ fn other_grid(found: &StreamedLevel, key: &str, name: &str, of: &StreamedChannel
     let shown = |Grid { dims, spacing, .. }: &Grid| format!("{dims} voxels of {spacing}");
     let allowed =
         format!("the grid of {name}, {}, for a volume that is streamed, or more memory", shown(of.values.grid()));
-    invalid(&found.origin, key, format!("a grid of {}", shown(found.grid())), allowed)
+    VolumeError::invalid(&found.origin, key, format!("a grid of {}", shown(found.grid())), allowed)
 }
 
 /// A sample of all channels and labels ([`sample`](super::sample())), which takes at most some bytes, of a level that all of them have.

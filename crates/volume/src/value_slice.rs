@@ -3,7 +3,7 @@
 use std::ops::RangeBounds;
 use std::slice::Iter;
 
-use super::samples::Sample;
+use super::sample_type::Sample;
 use crate::parallel::Indexed;
 use crate::parallel::prelude::*;
 

@@ -2,7 +2,7 @@
 
 use std::collections::TryReserveError;
 
-use super::samples::Sample;
+use super::sample_type::Sample;
 use super::value_slice::{CHUNK, ValueSlice, union, whole_range};
 use crate::for_type;
 use crate::parallel::prelude::*;

@@ -2,7 +2,7 @@
 
 use std::collections::TryReserveError;
 
-use super::samples::{Sample, SampleType};
+use super::sample_type::{Sample, SampleType};
 use super::values::Values;
 
 /// Voxels in memory, where many together may take fewer bits than each alone.

@@ -6,8 +6,8 @@ use quick_xml::XmlVersion;
 use quick_xml::events::BytesStart;
 
 use super::VolumeError;
+use super::error::volume::invalid;
 use super::fields::Fields;
-use super::source::invalid;
 
 /// An element's attributes by their names without prefix.
 pub(super) fn attributes(path: &Path, element: &BytesStart) -> Result<Fields, VolumeError> {

@@ -11,8 +11,9 @@ use flate2::Crc;
 use flate2::bufread::DeflateDecoder;
 
 use super::VolumeError;
-use super::samples::{MAX_EXPANSION, Stream};
-use super::source::{Source, invalid, io_error};
+use super::error::volume::{invalid, io_error};
+use super::source::Source;
+use super::stream::{MAX_EXPANSION, Stream};
 
 /// The size of the directory's end record without its comment, and the maximum length of the comment.
 const END: u64 = 22;

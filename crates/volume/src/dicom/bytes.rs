@@ -6,9 +6,10 @@ use std::path::PathBuf;
 use flate2::bufread::DeflateDecoder;
 
 use super::super::VolumeError;
+use super::super::error::volume::{invalid, io_error};
 use super::super::file::File;
-use super::super::samples::MAX_EXPANSION;
-use super::super::source::{CHUNK, Source, invalid, io_error};
+use super::super::source::{CHUNK, Source};
+use super::super::stream::MAX_EXPANSION;
 
 /// The remaining bytes of a file.
 pub(super) struct Bytes {

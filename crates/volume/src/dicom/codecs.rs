@@ -3,7 +3,7 @@
 use hayro_jpeg2000::{DecodeSettings, DecoderContext, Image};
 use jpeg_decoder::{Decoder, PixelFormat};
 
-use super::super::samples::MAX_EXPANSION;
+use super::super::stream::MAX_EXPANSION;
 
 /// The encoding of frames.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::super::VolumeError;
-use super::super::source::{invalid, number, shown};
+use super::super::error::volume::invalid;
+use super::super::text::{number, shown};
 
 /// A group and an element in one number.
 pub(super) type Tag = u32;

@@ -7,8 +7,8 @@ use std::sync::Arc;
 
 use super::super::VolumeError;
 use super::super::access::Access;
-use super::super::format::is_bare_dicom;
-use super::super::source::invalid;
+use super::super::error::volume::invalid;
+use super::super::head::is_bare_dicom;
 use super::bytes::Bytes;
 use super::dataset::{Dataset, Tag, name, shown_tag, tags};
 

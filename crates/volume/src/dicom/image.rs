@@ -7,8 +7,8 @@ use glam::DVec3;
 
 use super::super::VolumeError;
 use super::super::access::Access;
-use super::super::samples::SampleType;
-use super::super::source::{invalid, io_error};
+use super::super::error::volume::{invalid, io_error};
+use super::super::sample_type::SampleType;
 use super::codecs::Codec;
 use super::dataset::{Dataset, Tag, tags};
 use super::elements::{Elements, PixelData};

@@ -6,9 +6,9 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::super::VolumeError;
+use super::super::error::volume::invalid;
 use super::super::orientation::{lengths_and_directions, orthogonal};
 use super::super::shear::{self, Lattice};
-use super::super::source::invalid;
 use super::image::{Frame, Image};
 
 /// Directions with a smaller difference, and pixel sizes with a smaller relative difference, count as equal.

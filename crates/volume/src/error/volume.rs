@@ -1,6 +1,10 @@
 //! Errors of volumes, which are loaded before anything is drawn, or while it is.
 
-use std::path::PathBuf;
+use std::fmt::Display;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use super::setting::SettingError;
 
 /// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
@@ -54,4 +58,19 @@ impl VolumeError {
     ) -> Self {
         Self::Invalid { origin: origin.into(), field: field.into(), found: found.into(), allowed: allowed.into() }
     }
+}
+
+/// The error for an invalid field of a file.
+pub(crate) fn invalid(path: &Path, field: &str, found: impl Display, allowed: impl Display) -> VolumeError {
+    VolumeError::invalid(path.display().to_string(), field, found.to_string(), allowed.to_string())
+}
+
+/// The error for an invalid grid.
+pub(crate) fn refused(origin: &str, error: SettingError) -> VolumeError {
+    VolumeError::invalid(origin, &error.key, error.found.to_string(), error.allowed.to_string())
+}
+
+/// Makes the error of a file that could not be read.
+pub(crate) fn io_error(path: &Path) -> impl Fn(io::Error) -> VolumeError {
+    |source| VolumeError::Io { path: path.to_owned(), source }
 }

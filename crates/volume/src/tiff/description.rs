@@ -9,9 +9,10 @@ use quick_xml::events::Event;
 
 use super::super::VolumeError;
 use super::super::display::ChannelDisplay;
+use super::super::error::volume::invalid;
 use super::super::fields::Fields;
 use super::super::series::MAX_CHANNELS;
-use super::super::source::{invalid, number};
+use super::super::text::number;
 use super::super::unit::{common, unit};
 use super::super::xml;
 use super::display;

@@ -21,10 +21,12 @@ use self::pages::{Page, Pages};
 use self::stack::{Place, Run, Stack};
 use super::VolumeError;
 use super::access::Access;
+use super::error::volume::invalid;
+use super::grid::{SIZES, dims_of};
 use super::loaded::Loaded;
-use super::samples::{SIZES, Samples, Stream, dims_of};
+use super::samples::Samples;
 use super::series::{Series, apart};
-use super::source::invalid;
+use super::stream::Stream;
 use super::voxel::{Many, Voxel};
 
 /// Reads the pages of one file.

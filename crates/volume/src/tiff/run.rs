@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::super::VolumeError;
+use super::super::error::volume::invalid;
 use super::super::folder::{Part, natural};
-use super::super::source::invalid;
 
 /// Stands for a number; displayed as `#`, which names may contain.
 const NUMBER: &str = "/";

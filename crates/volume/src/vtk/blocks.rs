@@ -5,7 +5,7 @@ use std::{slice, vec};
 
 use flate2::read::ZlibDecoder;
 
-use super::super::samples::MAX_EXPANSION;
+use super::super::stream::MAX_EXPANSION;
 
 /// A compressor, by its name in the file.
 #[derive(Clone, Copy, Debug, PartialEq)]

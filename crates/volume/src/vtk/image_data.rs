@@ -11,17 +11,21 @@ use quick_xml::events::Event;
 
 use super::super::VolumeError;
 use super::super::access::Access;
+use super::super::error::volume::{invalid, io_error};
 use super::super::fields::Fields;
+use super::super::grid::{SIZES, dims_of};
 use super::super::loaded::Loaded;
 use super::super::numbers::TextEnd;
 use super::super::orientation::unit_directions;
-use super::super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
+use super::super::sample_type::SampleType;
+use super::super::samples::Samples;
 use super::super::series::{MAX_CHANNELS, Series, SeriesOrder};
-use super::super::source::{invalid, io_error, number, three};
+use super::super::stream::Stream;
+use super::super::text::{number, three};
 use super::super::voxel::Voxel;
 use super::super::xml;
 use super::blocks::{Base64, Blocks, Compressor, HeaderType};
-use super::warn_of_choice;
+use super::choice::warn_of_choice;
 
 const TYPES: [(&str, SampleType); 10] = [
     ("Int8", SampleType::I8),

@@ -7,11 +7,16 @@ use glam::{DVec3, UVec3};
 
 use super::super::VolumeError;
 use super::super::access::Access;
+use super::super::error::volume::{invalid, io_error};
 use super::super::fields::Fields;
+use super::super::grid::{SIZES, dims_of};
 use super::super::loaded::Loaded;
 use super::super::numbers::TextEnd;
-use super::super::samples::{SIZES, SampleType, Samples, Stream, dims_of};
-use super::super::source::{MAX_HEADER, Source, invalid, io_error, number, shown, three};
+use super::super::sample_type::SampleType;
+use super::super::samples::Samples;
+use super::super::source::{MAX_HEADER, Source};
+use super::super::stream::Stream;
+use super::super::text::{number, shown, three};
 use super::super::voxel::Voxel;
 
 /// The keywords that may follow an array.

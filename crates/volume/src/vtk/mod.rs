@@ -4,16 +4,9 @@
 //! rotates the volume as a whole, so it is checked but has no effect.
 
 mod blocks;
+mod choice;
 mod image_data;
 mod legacy;
 
 pub(super) use image_data::read as read_image_data;
 pub(super) use legacy::read as read_legacy;
-
-/// Warns which one of several arrays is used.
-fn warn_of_choice<'a>(path: &std::path::Path, names: impl Iterator<Item = &'a str>, taken: &str) {
-    let names: Vec<&str> = names.collect();
-    if names.len() > 1 {
-        log::warn!("{}: of the arrays {} the volume is {taken}", path.display(), names.join(", "));
-    }
-}

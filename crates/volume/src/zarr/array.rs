@@ -14,8 +14,9 @@ use zarrs::plugin::ExtensionName;
 
 use super::super::VolumeError;
 use super::super::access::Access;
-use super::super::samples::{SampleType, Samples};
-use super::super::source::invalid;
+use super::super::error::volume::invalid;
+use super::super::sample_type::SampleType;
+use super::super::samples::Samples;
 use super::super::voxel::Voxel;
 use super::axes::{Axes, KINDS};
 use super::codec;

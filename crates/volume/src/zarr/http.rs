@@ -14,7 +14,7 @@ use ureq::http::header::{ACCEPT_ENCODING, CONTENT_RANGE, RANGE};
 use ureq::{Agent, Body, Error};
 
 use super::super::VolumeError;
-use super::super::source::{invalid, io_error};
+use super::super::error::volume::{invalid, io_error};
 
 /// The maximum number of redirects that a request follows.
 const MAX_REDIRECTS: u32 = 5;

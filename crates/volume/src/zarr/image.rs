@@ -9,13 +9,12 @@ use serde_json::Value;
 
 use super::super::VolumeError;
 use super::super::access::Access;
+use super::super::address::archive_and_inner;
 use super::super::display::ChannelDisplay;
-use super::super::format::archive_and_inner;
+use super::super::error::volume::{invalid, refused};
 use super::super::grid::{Grid, check_spacing};
 use super::super::loaded::Loaded;
-use super::super::refused;
 use super::super::series::{MAX_CHANNELS, Series};
-use super::super::source::invalid;
 use super::super::voxel::Voxel;
 use super::array::ZarrArray;
 use super::axes::Axis;

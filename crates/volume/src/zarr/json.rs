@@ -5,7 +5,8 @@ use std::path::Path;
 use serde_json::Value;
 
 use super::super::VolumeError;
-use super::super::source::{invalid, shown};
+use super::super::error::volume::invalid;
+use super::super::text::shown;
 
 /// A value, or the lack of one.
 #[derive(Clone)]

@@ -10,7 +10,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::super::VolumeError;
 use super::super::access::Access;
-use super::super::source::{MAX_HEADER, Source, invalid, io_error};
+use super::super::error::volume::{invalid, io_error};
+use super::super::source::{MAX_HEADER, Source};
 use super::super::zip::{Directory, Member};
 #[cfg(feature = "http")]
 use super::http::Http;

@@ -1,0 +1,97 @@
+//! The types of samples: the numbers in a file.
+
+use std::fmt::{self, Display, Formatter};
+
+/// A number as stored in a file.
+pub trait Sample: Copy {
+    /// The nearest `f32`.
+    fn to_f32(self) -> f32;
+    /// The nearest `f64`.
+    fn to_f64(self) -> f64;
+}
+
+macro_rules! sample_types {
+    ($($name:ident: $type:ty = $text:literal),*) => {
+        /// The type of the samples in a file, displayed as in scene files: `int8`, `float32`.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
+        pub enum SampleType {
+            $(#[doc = concat!("`", stringify!($type), "`")] $name),*
+        }
+
+        impl Display for SampleType {
+            fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$name => $text),*
+                })
+            }
+        }
+
+        impl SampleType {
+            /// All types by name.
+            #[doc(hidden)]
+            pub const NAMED: [(&'static str, Self); 10] = [$(($text, Self::$name)),*];
+        }
+
+        $(impl Sample for $type {
+            fn to_f32(self) -> f32 {
+                self as f32
+            }
+
+            fn to_f64(self) -> f64 {
+                self as f64
+            }
+        })*
+    };
+}
+
+sample_types!(
+    I8: i8 = "int8",
+    U8: u8 = "uint8",
+    I16: i16 = "int16",
+    U16: u16 = "uint16",
+    I32: i32 = "int32",
+    U32: u32 = "uint32",
+    I64: i64 = "int64",
+    U64: u64 = "uint64",
+    F32: f32 = "float32",
+    F64: f64 = "float64"
+);
+
+/// Evaluates an expression in which a name stands for the type of a [`SampleType`]. It is compiled for each type.
+macro_rules! for_sample_type {
+    (@ $kind:expr, $type:ident => $result:expr; $($name:ident: $of:ty),*) => {
+        match $kind {
+            $($crate::sample_type::SampleType::$name => {
+                type $type = $of;
+                $result
+            })*
+        }
+    };
+    ($kind:expr, $type:ident => $result:expr) => {
+        for_sample_type!(@ $kind, $type => $result;
+            I8: i8, U8: u8, I16: i16, U16: u16, I32: i32, U32: u32, I64: i64, U64: u64, F32: f32, F64: f64)
+    };
+}
+pub(crate) use for_sample_type;
+
+impl SampleType {
+    /// The size of a sample in bytes.
+    pub(super) fn bytes(self) -> u64 {
+        for_sample_type!(self, Number => size_of::<Number>() as u64)
+    }
+
+    /// The number that stands for a full colour: an integer's maximum; 1 for floats.
+    pub(super) fn full(self) -> f64 {
+        match self {
+            Self::F32 | Self::F64 => 1.0,
+            _ => for_sample_type!(self, Number => Number::MAX as f64),
+        }
+    }
+
+    /// Appends the bytes, in the machine's order, of a sample written as text.
+    pub(super) fn parse(self, text: &str, into: &mut Vec<u8>) -> Option<()> {
+        for_sample_type!(self, Number => into.extend(text.parse::<Number>().ok()?.to_ne_bytes()));
+        Some(())
+    }
+}
