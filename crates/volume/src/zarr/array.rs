@@ -2,15 +2,11 @@
 
 use std::borrow::Cow;
 use std::fmt::{self, Debug, Display, Formatter};
-use std::num::NonZeroU64;
 use std::ops::Range;
 use std::sync::Arc;
 
 use glam::UVec3;
 use serde_json::Value;
-use zarrs::array::codec::api::{ArrayToBytesCodecTraits, CodecOptions};
-use zarrs::array::{Array, ArrayError, ArrayMetadata, ArrayMetadataV2, ArrayMetadataV3};
-use zarrs::plugin::ExtensionName;
 
 use super::super::VolumeError;
 use super::super::access::Access;
@@ -19,10 +15,14 @@ use super::super::sample_type::SampleType;
 use super::super::samples::Samples;
 use super::super::voxel::Voxel;
 use super::axes::{Axes, KINDS};
-use super::codec;
+use super::codec::Codecs;
 use super::half;
+use super::json::Json;
 use super::keys::Keys;
+use super::metadata::{self, ChunkKeys, Metadata};
+use super::number::Number;
 use super::shards::{MAX_IN_SHARD, Shards};
+use super::steps::compressed;
 use crate::parallel;
 use crate::parallel::prelude::*;
 
@@ -35,17 +35,23 @@ pub(super) type Sizes = [u64; KINDS];
 /// An array whose axes are known.
 pub(super) struct ZarrArray {
     keys: Arc<Keys>,
-    /// The metadata as zarrs takes it; what it states is read here.
-    array: Array<()>,
+    /// Where the array lies in the store.
+    path: String,
     metadata: Value,
+    /// The codecs of a chunk; of an inner one, where chunks lie in shards.
+    codecs: Codecs,
     /// How chunks are found in shards, if they lie in such.
     shards: Option<Shards>,
+    chunk_keys: ChunkKeys,
     axes: Axes,
+    number: Number,
     pub(super) kind: SampleType,
-    is_half: bool,
-    /// Whether the metadata state the value of voxels in chunks that the store does not hold.
+    /// The bytes of the value of voxels in chunks that the store does not hold, and whether the metadata state it.
+    fill: Vec<u8>,
     has_fill: bool,
     pub(super) shape: Sizes,
+    /// The shape of a chunk or shard that has a key.
+    outer: Vec<u64>,
     /// The shape of a chunk; of an inner one, where chunks lie in shards.
     chunk: Sizes,
     /// The number of values in a chunk.
@@ -94,26 +100,9 @@ impl Region {
 impl ZarrArray {
     /// Opens the array at a path of a store. Its axes are `axes`, or those that it names, or else the last ones of t, c, z, y, x.
     pub(super) fn open(keys: &Arc<Keys>, path: &str, axes: Option<&Axes>) -> Result<Self, VolumeError> {
-        codec::register();
-        let at = |file: &str| if path.is_empty() { file.to_owned() } else { format!("{path}/{file}") };
-        let folder = keys.file(path);
-        let (file, metadata) = if let Some(bytes) = keys.metadata(&at("zarr.json"))? {
-            let file = keys.file(&at("zarr.json"));
-            let parsed = serde_json::from_slice::<ArrayMetadataV3>(&bytes).map(ArrayMetadata::V3);
-            (file, parsed)
-        } else if let Some(bytes) = keys.metadata(&at(".zarray"))? {
-            let file = keys.file(&at(".zarray"));
-            (file, serde_json::from_slice::<ArrayMetadataV2>(&bytes).map(ArrayMetadata::V2))
-        } else {
-            return Err(invalid(&folder, "array", "nothing", "an array: zarr.json or .zarray"));
-        };
-        let metadata = metadata.map_err(|error| invalid(&file, "metadata", error, "that of a Zarr array"))?;
-        let path = if path.is_empty() { "/".to_owned() } else { format!("/{path}") };
-        let array = Array::new_with_metadata(Arc::new(()), &path, metadata).map_err(|error| {
-            let allowed = format!("a Zarr array of numbers on a regular grid, compressed by {}", codec::NAMES);
-            invalid(&file, "array", error, allowed)
-        })?;
-        let shape = array.shape();
+        let (file, metadata) = metadata::find(keys, path)?;
+        let stated = Metadata::read(&Json::new(&file, &metadata))?;
+        let Metadata { shape, number, fill, has_fill, chunk_keys, codecs } = stated;
         let wrong_axes = || {
             let allowed = match axes {
                 Some(axes) => format!("{}, as many as there are axes", axes.count()),
@@ -126,40 +115,20 @@ impl ZarrArray {
             None => Axes::plain(shape.len()),
         };
         let axes = axes.ok_or_else(wrong_axes)?;
-        let name = array.data_type().name_v3().unwrap_or_default();
-        let is_half = name == "float16";
-        let kind = match name.as_ref() {
-            "float16" => Some(SampleType::F32),
-            "bool" => Some(SampleType::U8),
-            name => SampleType::NAMED.into_iter().find(|(known, _)| *known == name).map(|(_, kind)| kind),
-        };
-        let kind = kind.ok_or_else(|| {
-            let names = SampleType::NAMED.map(|(name, _)| name).join(", ");
-            invalid(&file, "data_type", name, format!("{names}, float16, bool"))
-        })?;
-        let metadata = serde_json::to_value(array.metadata()).unwrap_or_default();
-        let grid = metadata["chunk_grid"]["name"].as_str().unwrap_or("regular");
-        if grid != "regular" {
-            return Err(invalid(&file, "chunk_grid", grid, "regular"));
-        }
-        let outer = array
-            .chunk_shape(&vec![0; shape.len()])
-            .map_err(|error| invalid(&file, "chunk_grid", error, "a regular grid of chunks"))?;
-        let shards = Shards::of(&metadata, &outer);
-        let shards = shards.map_err(|error| invalid(&file, "codecs", error, "shards of a whole number of chunks"))?;
-        let inner = shards.as_ref().map_or(&*outer, |shards| &shards.chunk);
+        let kind = number.kind();
+        let outer = codecs.shape().to_vec();
+        let (codecs, layout) = codecs.split();
+        let (inner, shards) = (codecs.shape(), layout.map(Shards::new));
         let product = |sizes: &[u64]| sizes.iter().try_fold(1_u64, |product, &size| product.checked_mul(size));
-        let numbers = |sizes: &[NonZeroU64]| sizes.iter().map(|size| size.get()).collect::<Vec<u64>>();
-        let (outer, inner) = (numbers(&outer), numbers(inner));
         let shown = |sizes: &[u64]| sizes.iter().map(u64::to_string).collect::<Vec<_>>().join(" × ");
         let is_grid = |sizes: &[u64]| sizes.iter().all(|&size| (1..=u64::from(u32::MAX)).contains(&size));
-        if !is_grid(shape) {
-            return Err(invalid(&file, "shape", shown(shape), "positive sizes, at most 4294967295 each"));
+        if !is_grid(&shape) {
+            return Err(invalid(&file, "shape", shown(&shape), "positive sizes, at most 4294967295 each"));
         }
-        let in_chunk = product(&inner).filter(|count| *count <= u64::from(u32::MAX) && is_grid(&outer));
+        let in_chunk = product(inner).filter(|count| *count <= u64::from(u32::MAX) && is_grid(&outer));
         let in_chunk =
-            in_chunk.ok_or_else(|| invalid(&file, "chunks", shown(&inner), "at most 4294967295 values in a chunk"))?;
-        let counts: Vec<u64> = shape.iter().zip(&inner).map(|(shape, chunk)| shape.div_ceil(*chunk)).collect();
+            in_chunk.ok_or_else(|| invalid(&file, "chunks", shown(inner), "at most 4294967295 values in a chunk"))?;
+        let counts: Vec<u64> = shape.iter().zip(inner).map(|(shape, chunk)| shape.div_ceil(*chunk)).collect();
         if product(&counts).is_none_or(|count| count > MAX_CHUNKS) {
             return Err(invalid(
                 &file,
@@ -168,11 +137,25 @@ impl ZarrArray {
                 format!("at most {MAX_CHUNKS}"),
             ));
         }
-        let (shape, chunk) = (axes.sort(shape, 1), axes.sort(&inner, 1));
-        let keys = Arc::clone(keys);
-        // In version 2 it may be null.
-        let has_fill = !metadata["fill_value"].is_null();
-        let opened = Self { keys, metadata, shards, axes, kind, is_half, has_fill, shape, chunk, in_chunk, array };
+        let (shape, chunk) = (axes.sort(&shape, 1), axes.sort(inner, 1));
+        let (keys, path) = (Arc::clone(keys), path.to_owned());
+        let opened = Self {
+            keys,
+            path,
+            metadata,
+            codecs,
+            shards,
+            chunk_keys,
+            axes,
+            number,
+            kind,
+            fill,
+            has_fill,
+            shape,
+            outer,
+            chunk,
+            in_chunk,
+        };
         opened.keys.permit(opened.encoded_bytes());
         Ok(opened)
     }
@@ -196,15 +179,15 @@ impl ZarrArray {
 
     /// The maximum number of bytes that a chunk, or the places of a shard's chunks, may have in the store.
     fn encoded_bytes(&self) -> u64 {
-        // The bound of `Compression::encoded_representation`.
-        let chunk = self.in_chunk.saturating_mul(self.kind.bytes()).saturating_mul(2).saturating_add(1 << 16);
+        let chunk = compressed(self.in_chunk.saturating_mul(self.kind.bytes())).max(self.codecs.limit());
         chunk.max(self.shards.as_ref().map_or(0, Shards::index_bytes))
     }
 
     /// The maximum number of bytes that reading `chunks` chunks at once takes, beside the values that are read.
     pub(super) fn chunk_memory<T>(&self, chunks: usize) -> u64 {
-        let decoded = self.in_chunk.saturating_mul(self.kind.bytes() + size_of::<T>() as u64);
-        let bytes = decoded.saturating_add(self.encoded_bytes()).saturating_mul(chunks as u64);
+        let decoded = self.in_chunk.saturating_mul(self.kind.bytes()).saturating_add(self.encoded_bytes());
+        let values = self.in_chunk.saturating_mul(size_of::<T>() as u64);
+        let bytes = decoded.max(self.codecs.memory()).saturating_add(values).saturating_mul(chunks as u64);
         let all: u64 = (0..KINDS).map(|axis| self.shape[axis].div_ceil(self.chunk[axis])).product();
         let indices = if self.shards.is_some() { 32 * all.min(MAX_IN_SHARD) } else { 0 };
         bytes.saturating_add(indices)
@@ -309,8 +292,8 @@ impl ZarrArray {
     /// A chunk that the store does not hold.
     fn filled<T: Voxel>(&self, place: Sizes) -> Result<Vec<T>, VolumeError> {
         self.check_absent(place)?;
-        let fill = self.widened(self.array.fill_value().as_ne_bytes().to_vec());
-        let fill = self.convert::<T>(&fill).map_err(|sample| self.refused::<T>(&self.key(place), sample))?;
+        let fill =
+            self.convert::<T>(self.fill.clone()).map_err(|sample| self.refused::<T>(&self.key(place), sample))?;
         Ok(fill.repeat(self.in_chunk as usize))
     }
 
@@ -323,25 +306,10 @@ impl ZarrArray {
     /// its bytes in the store.
     fn decode<T: Voxel>(&self, place: Sizes) -> Result<Decoded<T>, VolumeError> {
         let key = self.key(place);
-        let (data_type, fill) = (self.array.data_type(), self.array.fill_value());
-        let damaged = |error: &dyn Display| self.damaged(&key, place, error);
         let Some(code) = self.encoded(&key, place)? else { return Ok(None) };
         let length = code.len() as u64;
-        let (code, options) = (Cow::Owned(code), CodecOptions::default().with_concurrent_target(1));
-        let decoded = match &self.shards {
-            Some(Shards { codecs, chunk, .. }) => codecs.decode(code, chunk, data_type, fill, &options),
-            None => {
-                let chunk = self.outer().map_err(|error| damaged(&error))?;
-                self.array.codecs().decode(code, &chunk, data_type, fill, &options)
-            }
-        };
-        let bytes = decoded.map_err(|error| damaged(&error))?.into_fixed().map_err(|error| damaged(&error))?;
-        let bytes = self.widened(bytes.into_owned());
-        let expected = self.in_chunk * self.kind.bytes();
-        if bytes.len() as u64 != expected {
-            return Err(damaged(&format!("{} bytes of {expected}", bytes.len())));
-        }
-        let values = self.convert(&bytes).map_err(|sample| self.refused::<T>(&key, sample))?;
+        let decoded = self.codecs.decode(Cow::Owned(code)).map_err(|error| self.damaged(&key, place, &error))?;
+        let values = self.convert(decoded).map_err(|sample| self.refused::<T>(&key, sample))?;
         Ok(Some((values, length)))
     }
 
@@ -361,31 +329,21 @@ impl ZarrArray {
         }
     }
 
-    /// The shape of a chunk, or of a shard.
-    fn outer(&self) -> Result<Vec<NonZeroU64>, ArrayError> {
-        self.array.chunk_shape(&vec![0; self.axes.count()])
-    }
-
-    /// The bytes of samples, of 32 bits where they are stored with 16.
-    fn widened(&self, bytes: Vec<u8>) -> Vec<u8> {
-        if self.is_half { half::widen(&bytes) } else { bytes }
-    }
-
-    /// The voxels of samples in the machine's byte order.
-    fn convert<T: Voxel>(&self, bytes: &[u8]) -> Result<Vec<T>, f64> {
+    /// The voxels of numbers as the store holds them, in the machine's byte order.
+    fn convert<T: Voxel>(&self, bytes: Vec<u8>) -> Result<Vec<T>, f64> {
+        let bytes = if self.number == Number::Half { half::widen(&bytes) } else { bytes };
         let big_endian = cfg!(target_endian = "big");
         let dims = UVec3::new((bytes.len() as u64 / self.kind.bytes()) as u32, 1, 1);
         let layout = Samples { kind: self.kind, dims, big_endian, rescale: None, z_fastest: false };
         let mut voxels = Vec::with_capacity(dims.x as usize);
-        self.kind.convert(&layout, bytes, &mut voxels)?;
+        self.kind.convert(&layout, &bytes, &mut voxels)?;
         Ok(voxels)
     }
 
     /// The value of voxels in chunks that the store does not hold.
     pub(super) fn fill(&self) -> f32 {
-        let bytes = self.widened(self.array.fill_value().as_ne_bytes().to_vec());
         // Every number is a value.
-        self.convert::<f32>(&bytes).ok().and_then(|values| values.first().copied()).unwrap_or(f32::NAN)
+        self.convert::<f32>(self.fill.clone()).ok().and_then(|values| values.first().copied()).unwrap_or(f32::NAN)
     }
 
     /// Copies what lies in a region of the chunk at a place of the grid of chunks.
@@ -452,9 +410,9 @@ impl ZarrArray {
     /// The key of the chunk or the shard in which the chunk at a place lies.
     fn key(&self, place: Sizes) -> String {
         let origin: Vec<u64> = self.axes.unsort(std::array::from_fn(|axis| place[axis] * self.chunk[axis]));
-        let outer = self.outer().unwrap_or_default();
-        let chunk: Vec<u64> = origin.iter().zip(&outer).map(|(at, size)| at / size.get()).collect();
-        self.array.chunk_key(&chunk).as_str().to_owned()
+        let chunk: Vec<u64> = origin.iter().zip(&self.outer).map(|(at, size)| at / size).collect();
+        let name = self.chunk_keys.name(&chunk);
+        if self.path.is_empty() { name } else { format!("{}/{name}", self.path) }
     }
 
     /// The error for a chunk that cannot be decoded.

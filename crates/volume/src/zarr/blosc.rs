@@ -74,7 +74,7 @@ fn decode_block(mut code: &[u8], compressor: u8, streams: usize, block: &mut [u8
             0 => blosc_lz(bytes, stream).ok_or("a damaged BloscLZ stream")?,
             1 => lz4_flex::block::decompress_into(bytes, stream).map_err(|error| error.to_string())?,
             3 => ZlibDecoder::new(bytes).read_exact(stream).map(|()| expected).map_err(|error| error.to_string())?,
-            4 => super::codec::zstandard(bytes, stream)?,
+            4 => super::steps::zstandard(bytes, stream)?,
             2 => return Err("Snappy, which is not read".to_owned()),
             other => return Err(format!("compressor {other}")),
         };
@@ -86,7 +86,7 @@ fn decode_block(mut code: &[u8], compressor: u8, streams: usize, block: &mut [u8
 }
 
 /// Puts the bytes of elements, sorted by their place in the element, together. Bytes after the last whole element keep their places.
-fn unshuffle_bytes(sorted: &[u8], element: usize, into: &mut [u8]) {
+pub(super) fn unshuffle_bytes(sorted: &[u8], element: usize, into: &mut [u8]) {
     let count = sorted.len() / element;
     let whole = count * element;
     for (place, bytes) in sorted[..whole].chunks_exact(count.max(1)).enumerate() {

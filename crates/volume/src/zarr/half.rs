@@ -17,6 +17,21 @@ fn value(bits: u16) -> f32 {
     if bits >> 15 == 1 { -size } else { size }
 }
 
+/// The nearest number of 16 bits, of two the even one.
+pub(super) fn of(value: f64) -> u16 {
+    let exponent = ((value.to_bits() >> 52 & 0x7ff) as i32 - 1023).max(-14);
+    let bits = match exponent {
+        _ if value.is_nan() => 0x7e00,
+        16.. => 0x7c00,
+        // A fraction that is rounded up to 2 raises the exponent.
+        _ => {
+            let fraction = (value.abs() * 2.0_f64.powi(10 - exponent)).round_ties_even();
+            ((exponent + 14) << 10) as u16 + fraction as u16
+        }
+    };
+    if value.is_sign_negative() { bits | 1 << 15 } else { bits }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -30,5 +45,26 @@ mod tests {
         }
         assert_eq!(value(0xfc00), f32::NEG_INFINITY);
         assert!(value(0x7c01).is_nan());
+    }
+
+    #[test]
+    fn every_half_is_its_own_nearest() {
+        for bits in (0..=u16::MAX).filter(|&bits| !value(bits).is_nan()) {
+            assert_eq!(of(value(bits).into()), bits, "{bits:#x}");
+        }
+        assert_eq!(of(f64::NAN), 0x7e00);
+        // Halfway between neighbours: to the even one.
+        for (number, bits) in [
+            (1.0 + 1.0 / 2048.0, 0x3c00),
+            (1.0 + 3.0 / 2048.0, 0x3c02),
+            (65519.9, 0x7bff),
+            (65520.0, 0x7c00),
+            (1e300, 0x7c00),
+            (2.9e-8, 0),
+            (-6e-8, 0x8001),
+            (6.103e-5, 0x0400),
+        ] {
+            assert_eq!(of(number), bits, "{number}");
+        }
     }
 }

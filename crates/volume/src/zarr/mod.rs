@@ -1,7 +1,7 @@
 //! Zarr stores (versions 2 and 3): OME-Zarr 0.4 and 0.5 images with their levels and labels, and plain arrays.
 //!
-//! A store is a folder, on disk or at an address, or a ZIP archive of one (`.zip`, `.ozx`). zarrs opens arrays and takes shards and chunks apart; which bytes are read and how much
-//! they may expand to is decided here, in `keys` and `codec`.
+//! A store is a folder, on disk or at an address, or a ZIP archive of one (`.zip`, `.ozx`). `metadata` reads what an array states, `keys` which
+//! bytes of the store are read, and `codec` and `shards` take chunks apart.
 
 mod array;
 mod axes;
@@ -14,8 +14,11 @@ mod http;
 mod image;
 mod json;
 mod keys;
+mod metadata;
 mod multiscale;
+mod number;
 mod shards;
+mod steps;
 
 use std::path::Path;
 use std::sync::Arc;

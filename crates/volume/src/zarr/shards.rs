@@ -1,19 +1,13 @@
 //! Shards: values of a key in which several chunks lie, with an index of where each begins.
-//!
-//! zarrs reads shards too, but adds an index's numbers unchecked and reports a chunk that a shard does not hold as one of 2⁶⁴ bytes.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
-use std::num::NonZeroU64;
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use serde_json::Value;
-use zarrs::array::codec::CodecChain;
-use zarrs::array::codec::api::{ArrayToBytesCodecTraits, BytesRepresentation, CodecOptions};
-use zarrs::array::{FillValue, data_type};
-use zarrs::metadata::v3::MetadataV3;
-
+use super::super::VolumeError;
+use super::codec::Codecs;
+use super::json::Json;
 use super::keys::Keys;
 
 /// The number in an index that stands for a chunk that the shard does not hold.
@@ -22,74 +16,141 @@ const ABSENT: u64 = u64::MAX;
 /// The maximum number of chunks in a shard, whose places are read at once, and of places that are kept.
 pub(super) const MAX_IN_SHARD: u64 = 1 << 22;
 
-/// How an array's shards are read.
-pub(super) struct Shards {
-    /// The codecs of a chunk.
-    pub(super) codecs: CodecChain,
-    /// The shape of a chunk.
-    pub(super) chunk: Vec<NonZeroU64>,
-    index: CodecChain,
-    is_index_first: bool,
-    /// The shape of an index: the number of chunks along each axis, and two numbers for each chunk.
-    index_shape: Vec<NonZeroU64>,
+/// How chunks lie in a shard.
+pub(super) struct Layout {
+    /// The shape of a chunk, and the number of chunks along each axis.
+    chunk: Vec<u64>,
+    counts: Vec<u64>,
+    /// The codecs of the index, two numbers for each chunk, and the index's length in the shard.
+    index: Codecs,
     index_bytes: u64,
+    is_index_first: bool,
+    /// The bytes of a number that no chunk holds.
+    fill: Vec<u8>,
+}
+
+impl Layout {
+    /// The layout of shards of some shape, and the codecs of chunks in them.
+    pub(super) fn read(configuration: &Json, shard: &[u64], fill: &[u8]) -> Result<(Self, Codecs), VolumeError> {
+        configuration.only(&["chunk_shape", "codecs", "index_codecs", "index_location"])?;
+        let chunk_shape = configuration.get("chunk_shape");
+        let allowed =
+            format!("shards of a whole number of chunks, at most {MAX_IN_SHARD}: a shard has {shard:?} values");
+        let chunk = chunk_shape.integers(&allowed)?;
+        let divides = |(shard, chunk): (&u64, &u64)| *chunk > 0 && shard.is_multiple_of(*chunk);
+        if chunk.len() != shard.len() || !shard.iter().zip(&chunk).all(divides) {
+            return Err(chunk_shape.invalid(&allowed));
+        }
+        let counts: Vec<u64> = shard.iter().zip(&chunk).map(|(shard, chunk)| shard / chunk).collect();
+        let count = counts.iter().try_fold(1_u64, |product, &count| product.checked_mul(count));
+        if count.is_none_or(|count| count > MAX_IN_SHARD) {
+            return Err(chunk_shape.invalid(&allowed));
+        }
+        let index_codecs = configuration.get("index_codecs");
+        let index = Codecs::read(&index_codecs, &[&counts[..], &[2]].concat(), &ABSENT.to_ne_bytes())?;
+        let index_bytes = index.length();
+        let index_bytes = index_bytes.ok_or_else(|| index_codecs.invalid("codecs that give every index one length"))?;
+        let location = configuration.get("index_location");
+        let is_index_first = match location.text() {
+            None if !location.is_some() => false,
+            Some(place @ ("start" | "end")) => place == "start",
+            _ => return Err(location.invalid("start or end")),
+        };
+        let codecs = Codecs::read(&configuration.get("codecs"), &chunk, fill)?;
+        Ok((Self { chunk, counts, index, index_bytes, is_index_first, fill: fill.to_vec() }, codecs))
+    }
+
+    /// The number of chunks in a shard.
+    pub(super) fn count(&self) -> u64 {
+        self.counts.iter().product()
+    }
+
+    /// Where the index of a shard of some bytes lies.
+    fn place_of_index(&self, bytes: u64) -> Result<Range<u64>, String> {
+        let last = bytes.checked_sub(self.index_bytes);
+        let last =
+            last.ok_or_else(|| format!("a shard of {bytes} bytes, whose index alone takes {}", self.index_bytes))?;
+        let from = if self.is_index_first { 0 } else { last };
+        Ok(from..from + self.index_bytes)
+    }
+
+    /// The numbers of an index.
+    fn numbers(&self, code: Cow<[u8]>) -> Result<Vec<u64>, String> {
+        let bytes = self.index.decode(code).map_err(|error| format!("the shard's index: {error}"))?;
+        Ok(bytes.as_chunks().0.iter().map(|&number| u64::from_ne_bytes(number)).collect())
+    }
+
+    /// Decodes all chunks of a shard.
+    pub(super) fn decode(&self, shard: &[u8], codecs: &Codecs) -> Result<Vec<u8>, String> {
+        let part = |range: Range<u64>| {
+            let [from, to] = [range.start, range.end].map(|at| usize::try_from(at).unwrap_or(usize::MAX));
+            shard.get(from..to)
+        };
+        let index = part(self.place_of_index(shard.len() as u64)?).unwrap_or_default();
+        let index = self.numbers(Cow::Borrowed(index))?;
+        let shape: Vec<u64> = self.counts.iter().zip(&self.chunk).map(|(count, size)| count * size).collect();
+        let mut decoded = self.fill.repeat(shape.iter().product::<u64>() as usize);
+        for at in 0..self.count() {
+            let Some(range) = chunk_of(&index, at)? else { continue };
+            let found = range.clone();
+            let code = part(range).ok_or_else(|| format!("bytes {found:?} of a shard of {}", shard.len()))?;
+            let place = unravel(at, &self.counts);
+            let width = self.fill.len() * self.chunk.last().map_or(1, |&size| size as usize);
+            for (row, values) in codecs.decode(Cow::Borrowed(code))?.chunks_exact(width).enumerate() {
+                let inner = unravel(row as u64 * self.chunk.last().unwrap_or(&1), &self.chunk);
+                let value = (0..shape.len())
+                    .fold(0, |value, axis| value * shape[axis] + place[axis] * self.chunk[axis] + inner[axis]);
+                let to = value as usize * self.fill.len();
+                decoded[to..to + width].copy_from_slice(values);
+            }
+        }
+        Ok(decoded)
+    }
+}
+
+/// The place along each axis of an element of an array.
+fn unravel(mut index: u64, shape: &[u64]) -> Vec<u64> {
+    let mut place = vec![0; shape.len()];
+    for (at, size) in place.iter_mut().zip(shape).rev() {
+        (*at, index) = (index % size, index / size);
+    }
+    place
+}
+
+/// The bytes of a chunk by its number in the shard; `None` if the shard does not hold it.
+fn chunk_of(index: &[u64], at: u64) -> Result<Option<Range<u64>>, String> {
+    match index.as_chunks().0.get(at as usize) {
+        Some(&[ABSENT, ABSENT]) => Ok(None),
+        Some(&[from, bytes]) => {
+            let end = from.checked_add(bytes).ok_or("an index that leads out of the shard")?;
+            Ok(Some(from..end))
+        }
+        None => Err("an index of too few chunks".to_owned()),
+    }
+}
+
+/// How an array's shards are read, chunk by chunk.
+pub(super) struct Shards {
+    layout: Layout,
     /// Indices that were read; `None` for shards that are not in the store.
     read: Mutex<HashMap<String, Option<Arc<[u64]>>>>,
 }
 
 impl Shards {
-    /// The shards of an array; `None` if its chunks are in no shards, or other codecs change whole shards. The error says what is wrong.
-    pub(super) fn of(metadata: &Value, shard: &[NonZeroU64]) -> Result<Option<Self>, String> {
-        let Some([codec]) = metadata["codecs"].as_array().map(Vec::as_slice) else { return Ok(None) };
-        if codec["name"] != "sharding_indexed" {
-            return Ok(None);
-        }
-        let configuration = &codec["configuration"];
-        let chain = |key: &str| {
-            let codecs: Vec<MetadataV3> =
-                serde_json::from_value(configuration[key].clone()).map_err(|error| format!("{key}: {error}"))?;
-            CodecChain::from_metadata(&codecs).map_err(|error| format!("{key}: {error}"))
-        };
-        let (codecs, index) = (chain("codecs")?, chain("index_codecs")?);
-        let chunk: Vec<NonZeroU64> = serde_json::from_value(configuration["chunk_shape"].clone())
-            .map_err(|error| format!("chunk_shape: {error}"))?;
-        let divides = |(shard, chunk): (&NonZeroU64, &NonZeroU64)| shard.get().is_multiple_of(chunk.get());
-        if chunk.len() != shard.len() || !shard.iter().zip(&chunk).all(divides) {
-            return Err(format!("chunks of {chunk:?} in a shard of {shard:?}"));
-        }
-        let counts = shard.iter().zip(&chunk).filter_map(|(shard, chunk)| NonZeroU64::new(shard.get() / chunk.get()));
-        let index_shape: Vec<NonZeroU64> = counts.chain(NonZeroU64::new(2)).collect();
-        let count = index_shape.iter().try_fold(1_u64, |product, size| product.checked_mul(size.get()));
-        if count.is_none_or(|count| count > 2 * MAX_IN_SHARD) {
-            return Err(format!("more than {MAX_IN_SHARD} chunks in a shard"));
-        }
-        let representation = index.encoded_representation(&index_shape, &data_type::uint64(), &FillValue::from(ABSENT));
-        let Ok(BytesRepresentation::FixedSize(index_bytes)) = representation else {
-            return Err("index_codecs: an index of unknown length".to_owned());
-        };
-        let is_index_first = configuration["index_location"] == "start";
-        Ok(Some(Self { codecs, chunk, index, is_index_first, index_shape, index_bytes, read: Mutex::default() }))
+    pub(super) fn new(layout: Layout) -> Self {
+        Self { layout, read: Mutex::default() }
     }
 
     /// The number of bytes of an index.
     pub(super) fn index_bytes(&self) -> u64 {
-        self.index_bytes
+        self.layout.index_bytes
     }
 
     /// The place of a chunk in the shard of a key, by the chunk's place in the array's grid of chunks; `None` if the store does not hold it.
     pub(super) fn range(&self, keys: &Keys, key: &str, chunk: &[u64]) -> Result<Option<Range<u64>>, String> {
         let Some(index) = self.index_of(keys, key)? else { return Ok(None) };
-        let at =
-            self.index_shape.iter().zip(chunk).fold(0, |at, (count, place)| at * count.get() + place % count.get());
-        let entry = index.get(2 * at as usize..2 * at as usize + 2);
-        match entry {
-            Some(&[ABSENT, ABSENT]) => Ok(None),
-            Some(&[from, bytes]) => {
-                let end = from.checked_add(bytes).ok_or("an index that leads out of the shard")?;
-                Ok(Some(from..end))
-            }
-            _ => Err("an index of too few chunks".to_owned()),
-        }
+        let at = self.layout.counts.iter().zip(chunk).fold(0, |at, (count, place)| at * count + place % count);
+        chunk_of(&index, at)
     }
 
     /// The index of a shard; `None` if the store does not hold the shard.
@@ -101,21 +162,13 @@ impl Shards {
         let index = match keys.bytes(key).map_err(|error| error.to_string())? {
             None => None,
             Some(bytes) => {
-                let from = if self.is_index_first { 0 } else { bytes.saturating_sub(self.index_bytes) };
-                if bytes < self.index_bytes {
-                    return Err(format!("a shard of {bytes} bytes, whose index alone takes {}", self.index_bytes));
-                }
-                let code = keys.range(key, from..from + self.index_bytes).map_err(|error| error.to_string())?;
-                let (fill, options) = (FillValue::from(ABSENT), CodecOptions::default().with_concurrent_target(1));
-                let decoded =
-                    self.index.decode(Cow::Owned(code), &self.index_shape, &data_type::uint64(), &fill, &options);
-                let decoded = decoded.map_err(|error| format!("the shard's index: {error}"))?;
-                let bytes = decoded.into_fixed().map_err(|error| error.to_string())?;
-                Some(bytes.as_chunks().0.iter().map(|&number| u64::from_ne_bytes(number)).collect())
+                let place = self.layout.place_of_index(bytes)?;
+                let code = keys.range(key, place).map_err(|error| error.to_string())?;
+                Some(self.layout.numbers(Cow::Owned(code))?.into())
             }
         };
         let mut kept = kept();
-        if kept.len() as u64 * self.index_bytes > 16 * MAX_IN_SHARD {
+        if kept.len() as u64 * self.index_bytes() > 16 * MAX_IN_SHARD {
             kept.clear();
         }
         kept.insert(key.to_owned(), index.clone());
