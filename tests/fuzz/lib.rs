@@ -1,6 +1,8 @@
 //! The entry point of all libFuzzer targets.
 
 #[expect(dead_code, reason = "libFuzzer ends its processes, and what they leave is small")]
+#[path = "../../crates/volume/tests/fuzz/input.rs"]
+mod input;
 mod targets;
 
 /// Passes an input to the target with this name.

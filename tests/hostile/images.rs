@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use sheetsplat::golden::Picture;
 
+use crate::bounded::{Count, alone, bounded};
 use crate::mutate::{Random, mutant};
-use crate::{Count, bounded};
 
 /// The number of mutants of all kinds together.
-pub(crate) const FILES: usize = 6_000;
+const FILES: usize = 6_000;
 
 /// The maximum number of bytes allocated per byte of a PNG or EXR file: deflate's best compression, in the smallest pixels, each of which a
 /// palette turns into four bytes.
@@ -31,7 +31,10 @@ fn victims(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-pub(crate) fn mutated(random: &mut Random) -> Count {
+#[test]
+fn damaged_images_are_images_or_errors() {
+    let _alone = alone();
+    let mut random = Random::new();
     let folder = tempfile::tempdir().unwrap();
     let paths = victims(folder.path());
     let wholes: Vec<Vec<u8>> = paths.iter().map(|path| fs::read(path).unwrap()).collect();
@@ -39,7 +42,7 @@ pub(crate) fn mutated(random: &mut Random) -> Count {
     for (path, whole) in paths.iter().zip(&wholes) {
         for round in 0..FILES.div_ceil(paths.len()) {
             let other = &wholes[random.below(wholes.len())];
-            let mut mutant = mutant(random, whole, other);
+            let mut mutant = mutant(&mut random, whole, other);
             // A wrong checksum would end the reading of most of them.
             if round % 2 == 0 && path.extension().is_some_and(|extension| extension == "png") {
                 mend_checksums(&mut mutant);
@@ -59,7 +62,7 @@ pub(crate) fn mutated(random: &mut Random) -> Count {
             count.inputs += 1;
         }
     }
-    count
+    count.assert_mixed(FILES);
 }
 
 /// Gives a PNG's chunks the checksums of their contents.

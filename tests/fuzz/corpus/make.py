@@ -1,11 +1,10 @@
-"""Writes the images, the raw volume and the scenes beside this file, each by a program that is not sheetsplat.
+"""Writes the images and the scenes beside this file, the images by programs that are not sheetsplat.
 
-pip install numpy numcodecs OpenEXR pillow
+pip install numpy OpenEXR pillow
 """
 
 from pathlib import Path
 
-import numcodecs
 import numpy
 import OpenEXR
 from PIL import Image, PngImagePlugin
@@ -40,27 +39,6 @@ def png():
         image.save(folder("png-image") / f"{name}.png", optimize=True, pnginfo=golden if name == "rgb" else None)
 
 
-def zarr():
-    values = numpy.arange(256, dtype="<u2")
-    chunk = numpy.concatenate([values[64 * z + 8 * y :][:4] for z in range(2) for y in range(4)])
-    codecs = {
-        0: [numcodecs.Blosc(name, 9, shuffle) for name in ("blosclz", "lz4", "zlib", "zstd") for shuffle in (1, 2)],
-        1: [numcodecs.GZip()],
-        2: [numcodecs.Zstd()],
-        3: [numcodecs.Zlib()],
-        4: [numcodecs.BZ2()],
-        5: [numcodecs.CRC32C(location="end")],
-    }
-    for kind, of_kind in codecs.items():
-        for number, codec in enumerate(of_kind):
-            (folder("zarr") / f"chunk-{kind}-{number}").write_bytes(bytes([kind]) + bytes(codec.encode(values)))
-    # A shard of which two chunks are stored.
-    code = bytes(numcodecs.Zstd().encode(chunk))
-    index = numpy.full((8, 2), -1, "<i8")
-    index[0] = index[5] = 0, len(code)
-    (folder("zarr") / "shard").write_bytes(bytes([8]) + code + index.tobytes())
-
-
 def exr():
     header = lambda compression: {"compression": getattr(OpenEXR, f"{compression}_COMPRESSION"), "type": OpenEXR.scanlineimage}
     for name, compression, kind, channels in [
@@ -81,15 +59,6 @@ def npy():
     numpy.save(path / "c.npy", PIXELS)
     numpy.save(path / "fortran-big.npy", numpy.asfortranarray(PIXELS.astype(">f4")))
     numpy.save(path / "doubles.npy", PIXELS.astype("f8"))
-    values = numpy.arange(24, dtype="i2").reshape(2, 3, 4)
-    numpy.savez(folder("npz") / "stored.npz", values)
-    numpy.savez_compressed(folder("npz") / "deflated.npz", a=values, b=values)
-
-
-def raw():
-    # Sizes, sample type and offset, then what fills them.
-    (folder("raw") / "floats").write_bytes(bytes([3, 2, 4, 3, 1]) + b"." + numpy.arange(24, dtype="<f4").tobytes())
-    (folder("raw") / "big-doubles").write_bytes(bytes([2, 2, 2, 0x80 | 0x04, 0]) + numpy.arange(8, dtype=">f8").tobytes())
 
 
 def scenes():
@@ -132,15 +101,7 @@ color = [[0, [1, 0, 0]]]
         (folder("scene") / name).write_text(text)
 
 
-def nrrd():
-    header = "NRRD0005\ntype: int16\ndimension: 3\nsizes: 2 3 2\nspacings: 1 1 2\nendian: big\nencoding: raw\n# a comment\nkey:=value\n\n"
-    (folder("nrrd") / "raw.nrrd").write_bytes(header.encode() + numpy.arange(12, dtype=">i2").tobytes())
-
-
 png()
-zarr()
 exr()
 npy()
-raw()
 scenes()
-nrrd()

@@ -276,7 +276,6 @@ mod tests {
     use std::io::Write;
     use std::net::TcpListener;
     use std::thread::spawn;
-    use std::time::Instant;
 
     use super::*;
 
@@ -303,17 +302,15 @@ mod tests {
                 }
             }
         });
-        let limits = [Duration::from_millis(300), Duration::from_millis(1500)];
-        let store = Http::within(Path::new(&address), limits).unwrap();
-        for longest in [1000, 1000, 3000] {
-            let start = Instant::now();
+        // Only one of the limits can be reached, however slow this machine is.
+        let (short, long) = (Duration::from_millis(300), Duration::from_secs(3600));
+        for (limits, allowed) in [([short, long], "300ms"), ([short, long], "300ms"), ([long, short], "3600s")] {
+            let store = Http::within(Path::new(&address), limits).unwrap();
             let message = store.whole("zarr.json", 1000).unwrap_err().to_string();
-            assert!(
-                message.starts_with(&format!("{address}/zarr.json: address: found no answer in time")),
-                "{message}"
-            );
-            assert!(message.ends_with("allowed: an answer that stops for at most 300ms"), "{message}");
-            assert!(start.elapsed() < Duration::from_millis(longest), "{:?}", start.elapsed());
+            let found = format!("{address}/zarr.json: address: found no answer in time");
+            assert!(message.starts_with(&found), "{message}");
+            let allowed = format!("allowed: an answer that stops for at most {allowed}");
+            assert!(message.ends_with(&allowed), "{message}");
         }
     }
 
