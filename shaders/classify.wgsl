@@ -1,5 +1,22 @@
 // Classifies, shades and composites the slab between a plane and the previously drawn one (SPEC §9), in the tiles in which either plane has a
 // value, and marks opaque pixels (§6). One workgroup per tile.
+//
+// #import shared/band
+// #import shared/brick
+// #import shared/cells
+// #import shared/channels
+// #import shared/cut
+// #import shared/frame
+// #import shared/means
+// #import shared/opaque
+// #import shared/planes
+// #import shared/project
+// #import shared/seen
+// #import shared/shading
+// #import shared/slab
+// #import shared/texels
+// #import shared/tile_list
+// #import shared/volume
 
 @group(0) @binding(1) var<uniform> band: Band;
 // The sums of `field`, two layers for each channel; then those of `field_colors`, one for each channel whose voxels have colours of their own.

@@ -1,4 +1,9 @@
 // Zeroes the sheet buffers in the tiles that are about to receive splats.
+//
+// #import shared/brick
+// #import shared/frame
+// #import shared/sheets
+// #import shared/tile_list
 
 @group(0) @binding(1) var<storage, read> composited: TileList;
 

@@ -1,5 +1,9 @@
 // Lists the voxels that a sheet group draws, and those of them that are drawn for the first time, without gaps and in the order of the visits.
 // One workgroup, in which every thread writes a run of visits.
+//
+// #import shared/brick
+// #import shared/culled
+// #import shared/scan
 
 @group(0) @binding(0) var<storage, read> visits: array<Visit>;
 @group(0) @binding(1) var<storage, read> visit_args: Indirect;

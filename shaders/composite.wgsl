@@ -1,5 +1,14 @@
 // Composites a group of sheet buffers into the compositing buffer (eq. 2, front to back by default; SPEC §5), in the tiles that received
 // splats, and marks opaque pixels (§6). One workgroup per tile.
+//
+// #import shared/band
+// #import shared/brick
+// #import shared/compositing
+// #import shared/cut
+// #import shared/frame
+// #import shared/means
+// #import shared/opaque
+// #import shared/tile_list
 
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var sheets: texture_2d_array<f32>;

@@ -1,5 +1,11 @@
 // Finds the bricks that a sheet group visits (§6): those that reach into the group and are not entirely behind opaque pixels. One workgroup,
 // so that the visits keep the order of the bricks: the same frame gives the same bytes.
+//
+// #import shared/brick
+// #import shared/culled
+// #import shared/frame
+// #import shared/project
+// #import shared/scan
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> bricks: array<Brick>;

@@ -1,4 +1,10 @@
 // Finds the voxels of the visited bricks that a sheet group draws (§6). One workgroup per visited brick, one thread per slot.
+//
+// #import shared/brick
+// #import shared/culled
+// #import shared/frame
+// #import shared/local_ray
+// #import shared/project
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> bricks: array<Brick>;

@@ -1,5 +1,12 @@
 // Draws voxels onto a slab plane, one quad per voxel, and adds them up in two sheet buffers, as the sums for the field and its gradient (SPEC §9;
 // Mueller, Möller, Crawfis 1999).
+//
+// #import shared/brick
+// #import shared/field_voxel
+// #import shared/frame
+// #import shared/plane_quads
+// #import shared/planes
+// #import shared/sheets
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> voxels: array<FieldVoxel>;

@@ -1,4 +1,13 @@
 // Draws voxels with colours of their own onto a slab plane, as `field` draws their values, and adds the colours up in a sheet buffer (SPEC §10).
+//
+// #import shared/brick
+// #import shared/field_voxel
+// #import shared/frame
+// #import shared/plane_quads
+// #import shared/planes
+// #import shared/sheets
+// #import shared/splatted_color
+// #import shared/texels
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> voxels: array<FieldVoxel>;

@@ -1,5 +1,8 @@
 // The depth at which the opacity has reached a value (a first hit), in world units along the view direction, from the eye or, orthographic,
 // from the plane through the camera's centre.
+//
+// #import shared/cut
+// #import shared/frame
 
 @group(0) @binding(1) var<uniform> cut: Cut;
 @group(0) @binding(2) var surfaces: texture_depth_2d;

@@ -7,23 +7,23 @@
 //
 // One-shot loops: software drivers execute both sides of an `if` under a mask, but skip a loop without iterations. Work that is often skipped
 // therefore stands in `for (var x = condition; x; x = false)`, a loop that runs at most once.
+//
+// #import gather/bits
+// #import gather/economies
+// #import gather/group
+// #import gather/kernel
+// #import gather/pixels
+// #import gather/queue
+// #import gather/region
+// #import gather/sheets
+// #import gather/state
+// #import shared/frame
+// #import shared/means
 
 // Those of the voxels' own, if they have any.
 @group(0) @binding(15) var colors: texture_2d_array<u32>;
 
-// A kernel's sections begin at a group's near plane.
-const FIRST_PLANE = 0.0;
-
-// Channels share sheets, in which a voxel's footprint is the same.
-fn layers() -> u32 {
-    return 1u;
-}
-
 fn begin_layer(layer: u32) {}
-
-fn current_layer() -> u32 {
-    return 0u;
-}
 
 // Nothing is handed on from group to group.
 fn find_handed_on(pixels: Pixels) {}
@@ -36,16 +36,6 @@ fn counts_gaps() -> bool {
 // Whether all of them are, even behind the last brick of a patch.
 fn draws_all_groups() -> bool {
     return COMPOSITING == MINIMUM;
-}
-
-// Whether rays have ends that hide what lies behind.
-fn cuts_rays() -> bool {
-    return CUT;
-}
-
-// Whether pixels look along their rays.
-fn looks_along_rays() -> bool {
-    return CUT || is_by_means();
 }
 
 fn is_due_without_voxels(halves: u32) -> bool {
@@ -105,7 +95,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
 
 // Composites a thread's complete sheets into its pixels.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
-    passes += passes_per_look();
+    passes += select(0u, PASSES_PER_LOOK, CUT || is_by_means());
     find_stretches(pixels.column, pixels.rows);
     if FIRST_HIT {
         load_hits(pixels);

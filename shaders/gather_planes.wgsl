@@ -3,9 +3,27 @@
 //
 // A group's sheets are the sums on its four far planes. Its near plane is the previous group's last plane, whose field pixels carry in memory. Each channel
 // (SPEC §10) is a layer with bricks and sums of its own; the sheets of all are added up before they are composited.
+//
+// #import gather/bits
+// #import gather/group
+// #import gather/pixels
+// #import gather/plane_reach
+// #import gather/planes
+// #import gather/queue
+// #import gather/region
+// #import gather/slabs
+// #import gather/state
+// #import gather/voxels
+// #import shared/brick
+// #import shared/channels
+// #import shared/frame
+// #import shared/number
+// #import shared/planes
+// #import shared/seen
+// #import shared/splatted_color
+// #import shared/texels
+// #import shared/volume
 
-// What pixels carry from plane to plane; see `shared/slab`.
-@group(0) @binding(5) var<storage, read_write> carried: array<vec4u>;
 // For every channel.
 @group(0) @binding(15) var<uniform> planes_of: array<FieldPlanes, MOST_LAYERS>;
 // The bits of every voxel's coefficient, a number; read only if `EXACT`.
@@ -16,22 +34,9 @@
 // The maximum number of channels.
 const MOST_LAYERS = 16u;
 
-// The planes of the layer that is drawn.
-var<private> planes: FieldPlanes;
-
-// The first of a group's planes is one slab behind its near plane.
-const FIRST_PLANE = 1.0;
-
-// §8's economies apply only to splatted colours.
-const ECONOMIES = false;
-var<private> shallow: vec4u;
-
+// Economies (§8) apply only to splatted colours.
 fn shallow_after(words: vec4u, pixels: Pixels, opacity: vec4f) -> vec4u {
     return words;
-}
-
-fn layers() -> u32 {
-    return CHANNELS;
 }
 
 fn begin_layer(layer: u32) {
@@ -51,15 +56,6 @@ fn begin_layer(layer: u32) {
     }
 }
 
-fn current_layer() -> u32 {
-    return seen_channel.number;
-}
-
-// Whether the layer is the group's last one, with which its slabs are composited.
-fn is_last_layer() -> bool {
-    return seen_channel.number + 1u == CHANNELS;
-}
-
 // Groups are drawn whose near plane has values.
 fn counts_gaps() -> bool {
     return halves_handed_on != 0u;
@@ -77,54 +73,6 @@ fn is_due_without_voxels(halves: u32) -> bool {
 
 fn draws_front_to_back() -> bool {
     return true;
-}
-
-// Rays end where they leave the box of voxel centres.
-fn cuts_rays() -> bool {
-    return true;
-}
-
-// Whether pixels look along their rays.
-fn looks_along_rays() -> bool {
-    return true;
-}
-
-// A voxel's place: pixels right of the image's middle and below it, both times the depth from the eye, and sheet depth.
-fn placed(voxel: vec3u) -> vec4f {
-    return homogeneous(vec4f(vec3f(voxel), 1.0));
-}
-
-// The screen box that a kernel reaches on the group's far planes. From the first plane to the last its nearest point moves in one direction.
-fn screen_box(p: vec4f) -> ScreenBox {
-    let middle = 0.5 * vec2f(frame.size) - first_px;
-    if !PERSPECTIVE {
-        return ScreenBox(p.xy + middle, sheet_group.half_box);
-    }
-    let first = on_plane(p.xy, p.z, sheet_group.near + frame.slab_width).center_px - first_px;
-    let last = on_plane(p.xy, p.z, sheet_group.near + f32(SHEETS) * frame.slab_width).center_px - first_px;
-    return ScreenBox(0.5 * (first + last), 0.5 * abs(last - first) + sheet_group.half_box);
-}
-
-// Whether a kernel may be seen on some plane of the group.
-fn is_searched_in_perspective(search: SearchBounds, p: vec4f) -> bool {
-    let middle = 0.5 * vec2f(frame.size);
-    let first = on_plane(p.xy, p.z, sheet_group.near + frame.slab_width).center_px - middle;
-    let last = on_plane(p.xy, p.z, sheet_group.near + f32(SHEETS) * frame.slab_width).center_px - middle;
-    return all(max(first, last) >= search.low.xy) && all(min(first, last) <= search.high.xy)
-        && p.z >= search.low.z && p.z <= search.high.z;
-}
-
-// The range of the frame's sheets whose far planes a kernel reaches, from the first to the one after the last.
-fn overlapped_sheets(p: vec4f) -> vec2f {
-    let reach = frame.support / planes.step.w - gather.depth_error;
-    let sheets = (p.z + vec2f(-reach, reach) - gather.near) / frame.slab_width;
-    return vec2f(floor(sheets.x), ceil(sheets.y) - 1.0);
-}
-
-// The planes of a group that a voxel is gathered on.
-fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
-    let here = sheets_here(sheets);
-    return u32(here.y - here.x);
 }
 
 // Loads the layer's values and differences of the voxels of the queue from `first` on.
@@ -207,7 +155,7 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
 
 // Adds the layer's slabs in front of the four planes, whose sums are complete, to the group's; after the last layer they are composited.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
-    passes += passes_per_look() + PASSES_PER_SLABS + select(0u, PASSES_PER_SUMS, CHANNELS > 1u);
+    passes += PASSES_PER_LOOK + PASSES_PER_SLABS + select(0u, PASSES_PER_SUMS, CHANNELS > 1u);
     find_stretches(pixels.column, pixels.rows);
     if FIRST_HIT {
         load_hits(pixels);

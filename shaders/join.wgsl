@@ -1,5 +1,11 @@
 // Adds the image of a channel that shares no sheets with others to that of the channels before it (SPEC §10): at every pixel their sum, or of surfaces
 // the nearest one, or the sum of equally near ones. One thread per pixel of a band.
+//
+// #import shared/band
+// #import shared/brick
+// #import shared/cut
+// #import shared/finished
+// #import shared/frame
 
 @group(0) @binding(1) var<uniform> band: Band;
 // The channel's compositing buffer, and its first hits.

@@ -2,6 +2,10 @@
 // the threshold and compares with it; testing whether all pixels of a box are opaque is the same decision without rounding, on bits. In
 // perspective every group has its own box, and boxes shrink towards the back: the result of a larger box in front stays valid for a smaller
 // one in tiles that are not computed again. One workgroup per tile, one thread per row of 32 pixels.
+//
+// #import shared/brick
+// #import shared/frame
+// #import shared/tile_list
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> occluding: TileList;

@@ -1,4 +1,8 @@
 // Composites the compositing buffer over the background (SPEC §5), with premultiplied input and output.
+//
+// #import shared/band
+// #import shared/finished
+// #import shared/frame
 
 @group(0) @binding(1) var<uniform> band: Band;
 @group(0) @binding(2) var<storage, read> acc: array<vec4f>;

@@ -1,4 +1,9 @@
 // Draws whole kernels one by one, each composited like a sheet that contains nothing else (§3, composite-every-sample).
+//
+// #import shared/compositing
+// #import shared/frame
+// #import shared/sheets
+// #import shared/turned_quads
 
 @fragment
 fn fragment(quad: Quad) -> One {

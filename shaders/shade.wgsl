@@ -1,5 +1,16 @@
 // Projects and shades the voxels that are drawn for the first time, so each only once (Fig. 12). SPEC §3 defines classification and shading. Only
 // here does a voxel need its gradient; most voxels are hidden and never do (§6).
+//
+// #import shared/brick
+// #import shared/channels
+// #import shared/frame
+// #import shared/own_color
+// #import shared/project
+// #import shared/ramps
+// #import shared/shading
+// #import shared/splat
+// #import shared/texels
+// #import shared/volume
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var values: texture_2d_array<u32>;

@@ -1,5 +1,11 @@
 // Draws the kernel sections of a group of sheets as footprint quads that add up in the group's sheet buffers (§3.2), one quad per voxel. All
 // footprints have the same shape on the screen.
+//
+// #import shared/brick
+// #import shared/corners
+// #import shared/footprints
+// #import shared/frame
+// #import shared/sheets
 
 // The vertices of a quad provide everything that its fragments share, because on software rasterizers an interpolated constant costs a
 // fraction of a uniform.

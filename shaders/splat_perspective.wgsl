@@ -1,4 +1,8 @@
 // Draws the kernel sections of a group of sheets as footprint quads in perspective.
+//
+// #import shared/frame
+// #import shared/sheets
+// #import shared/turned_quads
 
 @fragment
 fn fragment_1(quad: Quad) -> One {

@@ -1,4 +1,9 @@
 // Finds the tiles that a sheet group composites, and those in which the occlusion buffer changes (§6). One workgroup.
+//
+// #import shared/brick
+// #import shared/culled
+// #import shared/frame
+// #import shared/tile_list
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read_write> culled: Culled;

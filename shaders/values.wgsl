@@ -1,4 +1,13 @@
 // Projects every voxel that is drawn onto a slab plane for the first time, and computes its number and gradient, once per frame (SPEC §9).
+//
+// #import shared/brick
+// #import shared/field_voxel
+// #import shared/frame
+// #import shared/number
+// #import shared/planes
+// #import shared/project
+// #import shared/texels
+// #import shared/volume
 
 @group(0) @binding(1) var<storage, read> bricks: array<Brick>;
 @group(0) @binding(2) var values: texture_2d_array<u32>;

@@ -1,54 +1,20 @@
 // The colours and amounts that the voxels in a subgroup's queue add to sheets, if they are classified and shaded before splatting (§3).
 //
-// Needs gather/economies.wgsl: economic_blocks, is_worthwhile, whole_sheet.
-// Needs gather/kernel.wgsl: footprint_at.
-// Needs gather/patch.wgsl: PASSES_PER_SHADING, PERSPECTIVE, bricks, color_ramp, first_px, gather, gradient_opacity_ramp, lane, lanes, opacity_ramp, passes, sheet_group.
-// Needs gather/queue.wgsl: queue_amounts, queue_blocks, queue_count, queue_first, queue_points.
-// Needs gather/ramps.wgsl: is_long, ramp_at.
-// Needs gather/voxels.wgsl: ScreenBox, count_drawn, sheets_here.
-// Needs gather/walk.wgsl: SearchBounds.
-// Needs shared/brick.wgsl: BRICK_VOXELS, voxel_of.
-// Needs shared/channels.wgsl: CHANNELS, ChannelSum, total, with_channel.
-// Needs shared/frame.wgsl: frame.
-// Needs shared/local_ray.wgsl: sections_on_screen.
-// Needs shared/own_color.wgsl: own_color.
-// Needs shared/project.wgsl: overlapped, project.
-// Needs shared/ramps.wgsl: LABELS, ramp, ramps_of.
-// Needs shared/shading.wgsl: lighting, shade.
-// Needs shared/texels.wgsl: index_of.
-// Needs shared/volume.wgsl: Gradient, HOLES, gradient_at, is_hole, read_channel, stored_at, value_of.
-
-// The range of the frame's sheets that a kernel overlaps, from the first to the one after the last.
-fn overlapped_sheets(p: vec4f) -> vec2f {
-    let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;
-    return vec2f(floor(sheets.x), ceil(sheets.y));
-}
-
-// The number of a kernel's sections in the group that are drawn.
-fn sections_here(p: vec4f, sheets: vec2f) -> u32 {
-    let here = sheets_here(sheets);
-    if PERSPECTIVE {
-        let footprint = footprint_at(p, sheet_group.near, -1.0, vec4f(0.0));
-        return sections_on_screen(p.xy, footprint.axis, footprint.maps, here - sheet_group.first_sheet);
-    }
-    return u32(here.y - here.x);
-}
-
-// A voxel's projection.
-fn placed(voxel: vec3u) -> vec4f {
-    return project(voxel);
-}
-
-// The box around the footprint at a projection.
-fn screen_box(p: vec4f) -> ScreenBox {
-    return ScreenBox(p.xy - first_px, sheet_group.half_box);
-}
-
-// Whether a voxel's footprint may be seen on the screen, and its kernel reaches the group.
-fn is_searched_in_perspective(search: SearchBounds, p: vec4f) -> bool {
-    let is_on_screen = all(p.xy >= search.low.xy * p.w) && all(p.xy <= search.high.xy * p.w);
-    return is_on_screen && p.z >= search.low.z && p.z <= search.high.z && p.w > frame.near;
-}
+// #import gather/economies
+// #import gather/queue
+// #import gather/ramps
+// #import gather/sheet_reach
+// #import gather/state
+// #import gather/voxels
+// #import shared/brick
+// #import shared/channels
+// #import shared/frame
+// #import shared/own_color
+// #import shared/project
+// #import shared/ramps
+// #import shared/shading
+// #import shared/texels
+// #import shared/volume
 
 // Shades the voxels of the queue from `first` on.
 fn shade_voxels(first: u32) {
@@ -62,7 +28,7 @@ fn shade_voxels(first: u32) {
         let p = project(at);
         let shaded = shaded(at, p);
         let sheets = overlapped_sheets(p);
-        let blocks = economic_blocks(queue_blocks[slot], shaded, p, sheets);
+        let blocks = economic_blocks(queue_blocks[slot], shaded.amount, shaded.alpha, p, sheets);
         if is_in {
             queue_amounts[slot] = shaded.amount;
             queue_blocks[slot] = blocks;

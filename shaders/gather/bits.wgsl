@@ -1,8 +1,7 @@
 // Bit masks, and values that a subgroup's lanes hold together.
 //
-// Needs gather/patch.wgsl: lane.
-// Needs gather/subgroup_lanes.wgsl: together.
-// Needs gather/workgroup_lanes.wgsl: together.
+// #import gather/lanes
+// #import gather/state
 
 // A mask of the lanes in which a condition holds.
 fn ballot(holds: bool) -> u32 {

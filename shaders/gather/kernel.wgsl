@@ -1,11 +1,10 @@
 // Kernels in the tile rasterizer's closed form: polynomials instead of tables (eq. 3).
 //
-// Needs gather/economies.wgsl: KernelPlanes, economic_planes, economic_rim, hold_rim, rim_of, within_rim.
-// Needs gather/patch.wgsl: PERSPECTIVE, gather.
-// Needs gather/subgroup_lanes.wgsl: begin_holding, end_holding, held, held_number, held_pair, hold.
-// Needs gather/workgroup_lanes.wgsl: begin_holding, end_holding, held, held_number, held_pair, hold.
-// Needs shared/frame.wgsl: frame.
-// Needs shared/local_ray.wgsl: SectionMaps, local_ray, near_cut, section_maps.
+// #import gather/economic_kernel
+// #import gather/lanes
+// #import gather/state
+// #import shared/frame
+// #import shared/local_ray
 
 // A voxel's kernel in the sheets of a group.
 struct Footprint {
@@ -109,7 +108,6 @@ const AXIS_SLOT = 4u;
 const ALONG_SLOT = 5u;
 const ACROSS_SLOT = 6u;
 const AMPLITUDE_SLOT = 7u;
-const RIM_SLOT = 8u;
 
 // Holds this lane's footprint for the others.
 fn hold_footprint(own: Footprint) {

@@ -1,128 +1,26 @@
-// A patch of the tile rasterizer, drawn front to back: its bindings, the loop over its groups, and the rounds in which a subgroup visits its
-// pixels. The stage's own file defines what a voxel adds to sheets and how they are composited.
+// A patch of the tile rasterizer, drawn front to back: the loop over its groups, and the rounds in which a subgroup visits its pixels. The stage's
+// own file defines what a voxel adds to sheets and how they are composited.
 //
-// Needs gather.wgsl: add_sections, begin_layer, composite_pixels, counts_gaps, draws_all_groups, find_handed_on, is_due_without_voxels, layers, looks_along_rays.
-// Needs gather/amounts.wgsl: shade_voxels.
-// Needs gather/economies.wgsl: shallow_after.
-// Needs gather/pixels.wgsl: halves_of, load_image, open_word, pixels_of.
-// Needs gather/planes.wgsl: Sheets, save_sheets, saved_sheets.
-// Needs gather/queue.wgsl: empty_queue, queue_count.
-// Needs gather/ramps.wgsl: Ramp, ramp_of.
-// Needs gather/region.wgsl: PATCH_HEIGHT, PATCH_WIDTH, with_blocks.
-// Needs gather/sheets.wgsl: Sheets, find_stretches, save_sheets, saved_sheets.
-// Needs gather/slabs.wgsl: find_handed_on, find_stretches.
-// Needs gather/subgroup_barrier.wgsl: meet.
-// Needs gather/subgroup_lanes.wgsl: sums_of_lanes, united.
-// Needs gather/uniforms.wgsl: Gather, Gathered, PatchRange.
-// Needs gather/voxels.wgsl: GatheredGroup, find_voxels, keep_voxels, may_appear, search_bounds.
-// Needs gather/walk.wgsl: is_walked, walk.
-// Needs gather/workgroup_barrier.wgsl: meet.
-// Needs gather/workgroup_lanes.wgsl: sums_of_lanes, united.
-// Needs gather_planes.wgsl: add_sections, begin_layer, composite_pixels, counts_gaps, draws_all_groups, is_due_without_voxels, layers, looks_along_rays, shade_voxels, shallow_after.
-// Needs shared/brick.wgsl: Brick, Indirect, LAYER_BITS, indirect, layer_bit, unfold.
-// Needs shared/cut.wgsl: Cut, FAR.
-// Needs shared/frame.wgsl: FRONT_TO_BACK, TILE, frame, start, tile_grid, zero.
-@group(0) @binding(1) var<uniform> gathers: array<Gather, 1>;
-@group(0) @binding(2) var<uniform> patch_range: PatchRange;
-@group(0) @binding(3) var<storage, read> bricks: array<Brick>;
-// For every patch and sheet group the place of its first brick in this list; behind all of these the indices of bricks.
-@group(0) @binding(4) var<storage, read> bins: array<u32>;
-// The control points of all ramps, one ramp after the other: value, then rgb or (ordinate, 0, 0); then the table of labels.
-@group(0) @binding(6) var<storage, read> control_points: array<vec4f>;
-@group(0) @binding(7) var values: texture_2d_array<u32>;
-@group(0) @binding(8) var<storage, read_write> acc: array<vec4f>;
-@group(0) @binding(9) var<storage, read_write> gathered: Gathered;
-// For every group, nearest first, half the screen box in pixels around its footprints.
-@group(0) @binding(10) var<storage, read> half_boxes: array<vec2f>;
-@group(0) @binding(11) var labels: texture_2d_array<u32>;
-// The arguments of the next dispatch, which is empty unless a subgroup has left work for it.
-@group(0) @binding(12) var<storage, read_write> next: Indirect;
-@group(0) @binding(13) var<uniform> cut: Cut;
-@group(0) @binding(14) var surfaces: texture_depth_2d;
-// The slots of pages, where voxels are in pages.
-@group(0) @binding(18) var pages: texture_2d_array<u32>;
-
-// `frame.compositing` and `frame.order`.
-override COMPOSITING: u32 = 0u;
-override ORDER: u32 = 0u;
-// Whether every voxel has its own ray.
-override PERSPECTIVE: bool = false;
-// Whether a footprint's box is the parallelogram of Fig. 13, else its bounding rectangle.
-override PARALLELOGRAM: bool = false;
-// Whether anything is cut, and whether first hits are requested.
-override CUT: bool = false;
-override FIRST_HIT: bool = false;
-
-// The number of threads in a workgroup: those of the largest subgroup, but at most those that hold a patch.
-override THREADS: u32 = 32u;
-// The number of workgroups per patch: more than one only if too much lies behind it.
-override WORKGROUPS_PER_PATCH: u32 = 1u;
-
-var<private> gather: Gather;
-
-// The subgroup.
-var<private> lane: u32;
-var<private> lanes: u32;
-
-// The patch: the centre of its first pixel, and a mask of the subgroup's pixels, over all its rounds, that are not opaque.
-var<private> first_px: vec2f;
-var<private> open: vec4u;
-
-// The group that is being drawn.
-var<private> sheet_group: GatheredGroup;
-
-// Counts of passes through loops, bricks visited, and voxels and sections drawn.
-var<private> passes: u32;
-var<private> bricks_visited: u32;
-var<private> drawn: vec2u;
-
-var<private> color_ramp: Ramp;
-var<private> opacity_ramp: Ramp;
-var<private> gradient_opacity_ramp: Ramp;
-
-// The number of sheets in a sheet group.
-const SHEETS = 4u;
-
-// The number of threads that hold a patch, and of its halves of blocks, which the smallest subgroups draw.
-const PATCH_THREADS = 32u;
-const HALVES = 8u;
-
-// Passes through loops that are not counted where they occur. Every loop costs one extra pass for its exit check, and so do the loops nested
-// in it; one-shot loops cost two.
-const PASSES_PER_GROUP = 6u;
-const PASSES_PER_FILL = 36u;
-const PASSES_PER_FIND = 5u;
-const PASSES_PER_SHADING = 7u;
-const PASSES_PER_ROUND = 18u;
-const PASSES_PER_BATCH = 4u;
-const PASSES_PER_ADDITION = 2u;
-
-// The passes that determine how four rays are cut, or over which stretch means count.
-fn passes_per_look() -> u32 {
-    return select(0u, 140u, looks_along_rays());
-}
-
-// The number of voxels of the queue that are tested at a time, one bit each.
-const BATCH = 64u;
-
-// The progress in a patch: a mask of its pixels that stay open after the group, and a mask of halves of blocks whose sheets are not empty.
-struct Progress {
-    open: vec4u,
-    shallow: vec4u,
-    begun: u32,
-}
+// #import gather/barrier
+// #import gather/group
+// #import gather/lanes
+// #import gather/pixels
+// #import gather/queue
+// #import gather/ramps
+// #import gather/reach
+// #import gather/region
+// #import gather/stage
+// #import gather/state
+// #import gather/voxels
+// #import gather/walk
+// #import shared/brick
+// #import shared/cut
+// #import shared/frame
 
 // The outcome of a group: whether the queue held all of its voxels at once, and whether it had any.
 struct GroupOutcome {
     is_whole: bool,
     has_drawn: bool,
-}
-
-// Distributes the ramps' control points among the lanes.
-fn hold_ramps() {
-    color_ramp = ramp_of(0u, frame.ramps.x);
-    opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
-    gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
 }
 
 // Finds the open pixels of the threads from `threads.x` to the one before `threads.y`. Returns a mask of their halves of blocks.

@@ -1,14 +1,10 @@
 // The pixels of a thread of the tile rasterizer, in the compositing buffer and among first hits.
 //
-// Needs gather.wgsl: cuts_rays.
-// Needs gather/patch.wgsl: acc, cut, gather, gathered, patch_range.
-// Needs gather/region.wgsl: block_word.
-// Needs gather/sheets.wgsl: hits, shown_from, shown_to.
-// Needs gather/slabs.wgsl: hits, shown_from, shown_to.
-// Needs gather/subgroup_lanes.wgsl: united.
-// Needs gather/workgroup_lanes.wgsl: united.
-// Needs gather_planes.wgsl: cuts_rays.
-// Needs shared/frame.wgsl: frame.
+// #import gather/lanes
+// #import gather/reach
+// #import gather/region
+// #import gather/state
+// #import shared/frame
 
 // A thread's four pixels.
 struct Pixels {
@@ -23,6 +19,11 @@ struct Pixels {
     slot: u32,
     is_inside: vec4<bool>,
 }
+
+// For a thread's four pixels: the sheet depths between which their rays count, and the depths of first hits, as bits.
+var<private> shown_from: vec4f;
+var<private> shown_to: vec4f;
+var<private> hits: vec4u;
 
 // A mask of the halves of blocks, four threads each, in which a subgroup has the threads of a round.
 fn halves_of(thread: u32) -> u32 {

@@ -1,13 +1,13 @@
 // The sums that a thread of the tile rasterizer gathers on the far planes of a group's four slabs, and the field that follows from them (SPEC §9).
 //
-// Needs gather/patch.wgsl: PATCH_THREADS, PERSPECTIVE, gather, sheet_group.
-// Needs gather/pixels.wgsl: Pixels.
-// Needs gather/subgroup_lanes.wgsl: begin_holding, end_holding, held, held_pair, hold.
-// Needs gather/workgroup_lanes.wgsl: begin_holding, end_holding, held, held_pair, hold.
-// Needs gather_planes.wgsl: planes.
-// Needs shared/frame.wgsl: frame.
-// Needs shared/planes.wgsl: MIN_WEIGHT.
-// Needs shared/seen.wgsl: OWN_COLORS.
+// #import gather/group
+// #import gather/lanes
+// #import gather/pixels
+// #import gather/plane_reach
+// #import gather/state
+// #import shared/frame
+// #import shared/planes
+// #import shared/seen
 
 // Whether gradients are the field's derivative instead of the voxels' differences.
 override KERNEL_GRADIENT: bool = false;

@@ -1,11 +1,10 @@
 // The voxels that a subgroup draws in a sheet group: found once for all pixels of a patch, shaded once for each layer, and kept for as long as their kernels reach
 // into the next sheet group. They are in workgroup memory, of which every subgroup has its own part.
 //
-// Needs gather.wgsl: current_layer, layers.
-// Needs gather/bits.wgsl: ballot, bits_from.
-// Needs gather/patch.wgsl: BATCH, THREADS, lane, lanes, passes.
-// Needs gather_planes.wgsl: current_layer, layers.
-// Needs shared/brick.wgsl: layer_bit.
+// #import gather/bits
+// #import gather/reach
+// #import gather/state
+// #import shared/brick
 
 // The number of voxels in all parts; a multiple of 32.
 override QUEUE: u32 = 96u;
@@ -18,6 +17,9 @@ override QUEUE_COLORS: u32 = 1u;
 var<workgroup> queue_colors: array<vec4f, QUEUE_COLORS>;
 // A mask of the blocks to whose pixels the voxel is drawn; see also `WHOLE_SHIFT`. Where there are several layers, it has the voxel's from bit 16 on.
 var<workgroup> queue_blocks: array<u32, QUEUE>;
+
+// The number of voxels of the queue that are tested at a time, one bit each.
+const BATCH = 64u;
 
 // The start of the subgroup's part.
 var<private> queue_first: u32;

@@ -1,15 +1,19 @@
 // Ramps whose first control points are distributed among the lanes of a subgroup.
 //
-// Needs gather/patch.wgsl: THREADS, control_points, lane, lanes.
-// Needs gather/subgroup_lanes.wgsl: control_point, control_value.
-// Needs gather/workgroup_lanes.wgsl: control_point, control_value.
-// Needs shared/shading.wgsl: between.
+// #import gather/lanes
+// #import gather/state
+// #import shared/frame
+// #import shared/shading
 
-// A ramp: the range of its control points, and this lane's share of the first of them.
-struct Ramp {
-    first: u32,
-    end: u32,
-    own: vec4f,
+var<private> color_ramp: Ramp;
+var<private> opacity_ramp: Ramp;
+var<private> gradient_opacity_ramp: Ramp;
+
+// Distributes the ramps' control points among the lanes.
+fn hold_ramps() {
+    color_ramp = ramp_of(0u, frame.ramps.x);
+    opacity_ramp = ramp_of(frame.ramps.x, frame.ramps.y);
+    gradient_opacity_ramp = ramp_of(frame.ramps.y, frame.ramps.z);
 }
 
 // Piecewise linear between the control points, at most one per lane, and clamped outside.

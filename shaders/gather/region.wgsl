@@ -1,9 +1,9 @@
 // Masks of a patch's pixels (§6): a word for each of its four blocks, with eight bits for each of the block's rows. Blocks are numbered row by
 // row.
 //
-// Needs gather/patch.wgsl: gather, lanes.
-// Needs gather/subgroup_lanes.wgsl: of_lane, of_opposite.
-// Needs gather/workgroup_lanes.wgsl: of_lane, of_opposite.
+// #import gather/lanes
+// #import gather/state
+// #import shared/frame
 
 // The width of a patch in pixels.
 const PATCH_WIDTH = 16u;
@@ -80,6 +80,21 @@ fn blocks_in_parallelogram(words: vec4u, center: vec2f, half_box: vec2f, half_wi
         | (row_of_blocks(rows, columns, 2u, center, half_width) << vec4u(16u))
         | (row_of_blocks(rows, columns, 3u, center, half_width) << vec4u(24u));
     return blocks_with(words, box);
+}
+
+// The box around a footprint on the screen, relative to the patch's first pixel.
+struct ScreenBox {
+    center: vec2f,
+    half: vec2f,
+}
+
+// A mask of the blocks in which the box around a footprint, scaled by `part`, contains a pixel of the mask.
+fn blocks_seen(words: vec4u, box: ScreenBox, part: f32) -> u32 {
+    let half = box.half * part + BOX_SLACK;
+    if PARALLELOGRAM {
+        return blocks_in_parallelogram(words, box.center, half, gather.half_width * part + BOX_SLACK);
+    }
+    return blocks_in_box(words, box.center, half);
 }
 
 // The pixels of the parallelogram in one row of every block, within some rows and columns.

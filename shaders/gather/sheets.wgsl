@@ -1,10 +1,11 @@
 // The sheets that a thread of the tile rasterizer holds, and how they are composited.
 //
-// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, ORDER, PATCH_THREADS, cut.
-// Needs shared/compositing.wgsl: composite.
-// Needs shared/cut.wgsl: is_drawn_slab, noted, shown, shown_share.
-// Needs shared/frame.wgsl: FRONT_TO_BACK, MINIMUM, SURFACE, frame.
-// Needs shared/means.wgsl: Means, is_by_means, means.
+// #import gather/pixels
+// #import gather/state
+// #import shared/compositing
+// #import shared/cut
+// #import shared/frame
+// #import shared/means
 
 // The four sheets of a group at a thread's four pixels: red, green, blue and alpha columns.
 struct Sheets {
@@ -50,11 +51,6 @@ fn saved_sheet(thread: u32, column: u32) -> mat4x4f {
 fn added(section: vec4f, amount: vec4f) -> mat4x4f {
     return mat4x4f(section * amount.x, section * amount.y, section * amount.z, section * amount.w);
 }
-
-// For a thread's four pixels, the range of visible sheet depths on their rays, and the bits of first hits.
-var<private> shown_from: vec4f;
-var<private> shown_to: vec4f;
-var<private> hits: vec4u;
 
 // The weights of sheets at these pixels, see `Means`.
 var<private> weights: vec4f;

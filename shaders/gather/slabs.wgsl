@@ -1,32 +1,31 @@
 // The slabs between planes at a thread's pixels: classified, shaded and composited (SPEC §9).
 //
-// Needs gather/patch.wgsl: COMPOSITING, CUT, FIRST_HIT, PATCH_THREADS, PERSPECTIVE, SHEETS, THREADS, acc, cut, gather, passes, sheet_group.
-// Needs gather/pixels.wgsl: Pixels, halves_of.
-// Needs gather/planes.wgsl: Fields, KERNEL_GRADIENT, PlaneSums, Sheets, colors_of, fields_of, saved.
-// Needs gather/subgroup_lanes.wgsl: largest, united.
-// Needs gather/workgroup_lanes.wgsl: largest, united.
-// Needs gather_planes.wgsl: carried, is_last_layer.
-// Needs shared/cells.wgsl: nearest_voxel, voxel_at.
-// Needs shared/channels.wgsl: CHANNELS.
-// Needs shared/cut.wgsl: FAR, noted, place_of, sheet_depths, shown_depths.
-// Needs shared/frame.wgsl: AVERAGE, SURFACE, frame.
-// Needs shared/means.wgsl: both, in_box, is_by_means.
-// Needs shared/planes.wgsl: NO_NUMBER.
-// Needs shared/project.wgsl: slope_of.
-// Needs shared/ramps.wgsl: LABELS.
-// Needs shared/seen.wgsl: OWN_COLORS, table_at.
-// Needs shared/shading.wgsl: lighting.
-// Needs shared/slab.wgsl: Composited, NOTHING_CARRIED, NO_SAMPLE, Slab, carried_by, carried_color, carried_sample, carry, carry_color, choose, composite_sheet, find_surface, is_drawn, part_of, sheet_of, slab_between, with_sample.
-// Needs shared/slab_integral.wgsl: Table.
-// Needs shared/texels.wgsl: index_of.
-// Needs shared/volume.wgsl: HOLES, is_hole, stored_at.
+// #import gather/group
+// #import gather/lanes
+// #import gather/pixels
+// #import gather/plane_reach
+// #import gather/planes
+// #import gather/state
+// #import shared/cells
+// #import shared/channels
+// #import shared/cut
+// #import shared/frame
+// #import shared/means
+// #import shared/planes
+// #import shared/project
+// #import shared/ramps
+// #import shared/seen
+// #import shared/shading
+// #import shared/slab
+// #import shared/slab_integral
+// #import shared/texels
+// #import shared/volume
 
-// For a thread's four pixels: the sheet depths between which their rays count, the length of a ray per sheet depth, and the depths of first
-// hits, as bits.
-var<private> shown_from: vec4f;
-var<private> shown_to: vec4f;
+// What pixels carry from plane to plane; see `shared/slab`.
+@group(0) @binding(5) var<storage, read_write> carried: array<vec4u>;
+
+// The length of a ray per sheet depth at a thread's four pixels.
 var<private> length_per_depth: vec4f;
-var<private> hits: vec4u;
 
 // Finds the stretches of the rays of a thread's four pixels, which lie in one column.
 fn find_stretches(column: f32, rows: vec4f) {

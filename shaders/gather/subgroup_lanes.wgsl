@@ -1,8 +1,7 @@
 // The lanes that draw a patch: a subgroup, as the other files call them. They read one another's registers. `gather/workgroup_lanes.wgsl` has the same
 // functions for devices without subgroups.
 //
-// Needs gather/patch.wgsl: THREADS, draw_of_workgroup, lane, lanes.
-// Needs gather/ramps.wgsl: Ramp.
+// #import gather/state
 
 // Another lane's number. As in all of these functions, all lanes take part.
 fn of_lane(own: u32, other: u32) -> u32 {
@@ -68,17 +67,4 @@ fn held_pair(slot: u32, own: vec2f, other: u32) -> vec2f {
 
 fn held_number(slot: u32, own: f32, other: u32) -> f32 {
     return subgroupShuffle(own, other);
-}
-
-@compute @workgroup_size(THREADS)
-fn main(
-    @builtin(local_invocation_index) thread: u32,
-    @builtin(workgroup_id) workgroup: vec3u,
-    @builtin(subgroup_size) subgroup_size: u32,
-    @builtin(subgroup_invocation_id) subgroup_invocation_id: u32,
-) {
-    // A larger subgroup has the patch's threads and no others.
-    lanes = min(subgroup_size, THREADS);
-    lane = subgroup_invocation_id;
-    draw_of_workgroup(workgroup, thread);
 }

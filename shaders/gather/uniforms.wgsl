@@ -1,6 +1,7 @@
 // The tile rasterizer's uniforms and counts; `gpu::layout` documents the fields.
 //
-// Needs shared/tally.wgsl: Tally.
+// #import shared/tally
+
 struct Gather {
     along: array<vec4f, 4>,
     chord: array<vec4f, 2>,

@@ -1,52 +1,15 @@
 // The voxels that a subgroup of the tile rasterizer draws in a sheet group: which of the previous ones stay, which are added, their shading, and
 // their counts.
 //
-// Needs gather.wgsl: FIRST_PLANE, current_layer, layers.
-// Needs gather/amounts.wgsl: overlapped_sheets, placed, screen_box, sections_here.
-// Needs gather/economies.wgsl: ECONOMIES.
-// Needs gather/patch.wgsl: ORDER, PARALLELOGRAM, PASSES_PER_FIND, PERSPECTIVE, SHEETS, drawn, first_px, gather, gathered, lane, lanes, open, passes, sheet_group.
-// Needs gather/queue.wgsl: QUEUE_COLORS, enqueue, queue_amounts, queue_blocks, queue_colors, queue_count, queue_first, queue_points, queue_size.
-// Needs gather/region.wgsl: blocks_in_box, blocks_in_parallelogram, bounds_of.
-// Needs gather/subgroup_barrier.wgsl: meet.
-// Needs gather/walk.wgsl: Found, SearchBounds, next_voxels.
-// Needs gather/workgroup_barrier.wgsl: meet.
-// Needs gather_planes.wgsl: ECONOMIES, FIRST_PLANE, current_layer, layers, overlapped_sheets, placed, screen_box, sections_here.
-// Needs shared/brick.wgsl: LAYER_BITS.
-// Needs shared/frame.wgsl: BOX_SLACK, FRONT_TO_BACK, frame.
-
-// A group of sheets: its number, its first sheet, the depth where that begins, and half the box around its footprints.
-struct GatheredGroup {
-    number: u32,
-    first_sheet: f32,
-    near: f32,
-    half_box: vec2f,
-}
-
-// The part of that range in the sheet group.
-fn sheets_here(sheets: vec2f) -> vec2f {
-    return clamp(sheets, vec2f(sheet_group.first_sheet), vec2f(sheet_group.first_sheet + f32(SHEETS)));
-}
-
-// The first group, in drawing order, that a kernel overlaps.
-fn first_group(sheets: vec2f) -> f32 {
-    let sheet = select(min(sheets.y, f32(gather.groups * SHEETS)) - 1.0, max(sheets.x, 0.0), ORDER == FRONT_TO_BACK);
-    return floor(sheet / f32(SHEETS));
-}
-
-// The box around a footprint on the screen, relative to the patch's first pixel.
-struct ScreenBox {
-    center: vec2f,
-    half: vec2f,
-}
-
-// A mask of the blocks in which the box around a footprint, scaled by `part`, contains a pixel of the mask.
-fn blocks_seen(words: vec4u, box: ScreenBox, part: f32) -> u32 {
-    let half = box.half * part + BOX_SLACK;
-    if PARALLELOGRAM {
-        return blocks_in_parallelogram(words, box.center, half, gather.half_width * part + BOX_SLACK);
-    }
-    return blocks_in_box(words, box.center, half);
-}
+// #import gather/barrier
+// #import gather/group
+// #import gather/queue
+// #import gather/reach
+// #import gather/region
+// #import gather/state
+// #import gather/walk
+// #import shared/brick
+// #import shared/frame
 
 // The extent of a kernel's sections in the group, relative to the kernel's: that of the section nearest to the kernel's centre.
 fn extent_here(p: vec4f) -> f32 {

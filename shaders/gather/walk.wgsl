@@ -1,22 +1,14 @@
 // The walk through a sheet group's bricks behind a patch, which finds the voxels whose kernels may reach the group and open pixels, one per lane at
 // a time.
 //
-// Needs gather.wgsl: layers.
-// Needs gather/amounts.wgsl: is_searched_in_perspective.
-// Needs gather/bits.wgsl: ballot, nth_set_bit.
-// Needs gather/patch.wgsl: PERSPECTIVE, bins, bricks, bricks_visited, lane, lanes, passes.
-// Needs gather/subgroup_lanes.wgsl: together.
-// Needs gather/workgroup_lanes.wgsl: together.
-// Needs gather_planes.wgsl: is_searched_in_perspective, layers.
-// Needs shared/brick.wgsl: BRICK_VOXELS, Brick, in_brick, layers_of.
-// Needs shared/frame.wgsl: frame.
-// Needs shared/project.wgsl: homogeneous.
-
-// The bounds of a search: homogeneous pixel coordinates relative to the image's middle, and sheet depths.
-struct SearchBounds {
-    low: vec3f,
-    high: vec3f,
-}
+// #import gather/bits
+// #import gather/group
+// #import gather/lanes
+// #import gather/reach
+// #import gather/state
+// #import shared/brick
+// #import shared/frame
+// #import shared/project
 
 fn is_searched_for(search: SearchBounds, p: vec4f) -> bool {
     if PERSPECTIVE {

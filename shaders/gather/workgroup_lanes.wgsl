@@ -1,9 +1,8 @@
 // The same as `gather/subgroup_lanes.wgsl` for devices without subgroups: the lanes that draw a patch are a workgroup, and read one another's values from
 // its memory.
 //
-// Needs gather/patch.wgsl: PATCH_THREADS, THREADS, control_points, draw_of_workgroup, lane, lanes.
-// Needs gather/ramps.wgsl: Ramp.
-// Needs gather/workgroup_barrier.wgsl: meet.
+// #import gather/barrier
+// #import gather/state
 
 // What lanes tell one another at once. Two places are used by turns, so that no lane writes to one before all have read it.
 var<workgroup> told: array<vec2u, 2u * PATCH_THREADS>;
@@ -113,11 +112,4 @@ fn held_pair(slot: u32, own: vec2f, other: u32) -> vec2f {
 
 fn held_number(slot: u32, own: f32, other: u32) -> f32 {
     return held_by_lanes[slot * THREADS + other].x;
-}
-
-@compute @workgroup_size(THREADS)
-fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
-    lanes = THREADS;
-    lane = thread;
-    draw_of_workgroup(workgroup, thread);
 }

@@ -1,4 +1,7 @@
-// The points of pixels' rays, and the voxels whose cells contain them. A stage that includes this declares what `cut` needs.
+// The points of pixels' rays, and the voxels whose cells contain them.
+// The stage declares `cut`.
+//
+// #import shared/frame
 
 // The point of a pixel's ray at a sheet depth, in voxels.
 fn voxel_at(at: vec3f, sheet_depth: f32) -> vec3f {

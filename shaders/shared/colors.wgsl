@@ -1,5 +1,7 @@
-// Colours of voxels' own (SPEC §10). A stage that includes this includes `texels` and declares `colors`, a texture array that `gpu::volume_texture`
-// folds, of the colours of all channels that have any.
+// Colours of voxels' own (SPEC §10). `colors` is a texture array that `gpu::volume_texture` folds, of the colours of all channels that have any.
+// The stage declares `colors`.
+//
+// #import shared/texels
 
 // The number that stands for 1 in them; 0 if voxels have none of their own.
 override FULL_COLOR: u32 = 0u;

@@ -1,4 +1,6 @@
 // Compositing of one sheet (eq. 2, SPEC §5).
+//
+// #import shared/frame
 
 // (1 - exp(-a)) / a, and 1 at 0. The difference cancels in f32 for small a, where the series is exact.
 fn absorbed(a: f32) -> f32 {

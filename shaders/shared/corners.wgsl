@@ -1,4 +1,6 @@
 // Where the corners of quads are drawn.
+//
+// #import shared/frame
 
 // The maximum distance in pixels from the image's corner at which a footprint's corners are drawn.
 const FAR_PX = 65536.0;

@@ -1,5 +1,8 @@
-// Cuts of a pixel's ray by clip planes and a host's surfaces, and the volume's box; `gpu::layout::Cut` documents the fields. A stage that
-// includes this declares `cut: Cut` and `surfaces: texture_depth_2d`.
+// Cuts of a pixel's ray by clip planes and a host's surfaces, and the volume's box; `gpu::layout::Cut` documents the fields.
+// The stage declares `cut` and `surfaces`.
+//
+// #import shared/frame
+
 struct Cut {
     sheet_at: vec4f,
     sheet_along: vec4f,

@@ -1,4 +1,7 @@
 // The colour that the compositing buffer stands for, before the background (SPEC §5).
+//
+// #import shared/frame
+
 fn finished(image: vec4f, compositing: u32) -> vec4f {
     switch compositing {
         case XRAY, AVERAGE: {

@@ -1,5 +1,13 @@
 // The first point between two samples of a pixel's ray at which `opacity·gradient_opacity` reaches one half (SPEC §9, `surface`). Values and
-// gradients run linearly between the samples. A stage that includes this includes `seen`.
+// gradients run linearly between the samples.
+// The stage declares `control_points`.
+//
+// #import shared/cells
+// #import shared/cut
+// #import shared/ramps
+// #import shared/seen
+// #import shared/slab_integral
+// #import shared/texels
 
 // The share of the way that stands for no surface.
 const NO_SURFACE = 2.0;

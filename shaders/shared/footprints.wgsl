@@ -1,4 +1,8 @@
 // Kernel footprints from their stored forms (§§3.2, 3.3.1), and the quads with which they are drawn, for `splat` and `splat_perspective`.
+//
+// #import shared/brick
+// #import shared/frame
+// #import shared/splat
 
 @group(0) @binding(1) var<uniform> sheet_group: SheetGroup;
 @group(0) @binding(2) var<storage, read> splats: array<Splat>;

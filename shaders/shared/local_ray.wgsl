@@ -1,4 +1,8 @@
 // The map from a voxel's kernel to the screen in perspective, where every voxel has its own ray (§3.3.2, end of §4.2).
+//
+// #import shared/frame
+// #import shared/project
+
 struct LocalRay {
     // Grid units of the kernel per unit of depth along the ray: λ/(r·w).
     kernel_per_depth: f32,

@@ -1,5 +1,8 @@
-// The means of sheets along pixels' rays, for the compositing modes that use them; `splatting::Compositing` defines them. A stage that includes
-// this declares `COMPOSITING`, and what `cut` needs.
+// The means of sheets along pixels' rays, for the compositing modes that use them; `splatting::Compositing` defines them.
+// The stage declares `COMPOSITING` and `cut`.
+//
+// #import shared/cut
+// #import shared/frame
 
 // The weight of a pixel's sheets, and which of them count.
 struct Means {

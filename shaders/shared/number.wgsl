@@ -1,5 +1,10 @@
-// The numbers that are splatted for voxels (SPEC §9). A stage that includes this declares `coefficients`, and what `volume` and `planes` need, and includes
-// `exact`.
+// The numbers that are splatted for voxels (SPEC §9).
+// The stage declares `coefficients` and `planes`.
+//
+// #import shared/exact
+// #import shared/frame
+// #import shared/texels
+// #import shared/volume
 
 // A voxel's coefficient in the channel that is read, as a number.
 fn number_at(index: u32) -> f32 {

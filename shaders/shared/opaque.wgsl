@@ -1,5 +1,7 @@
-// Marks the opaque pixels of a tile (§6), with a workgroup of 32×8 threads per tile. A stage that includes this declares `opaque`, one bit per
-// pixel, and `opaque_tiles`, a word per tile.
+// Marks the opaque pixels of a tile (§6), with a workgroup of 32×8 threads per tile. `opaque` has one bit per pixel, and `opaque_tiles` a word per tile.
+// The stage declares `opaque` and `opaque_tiles`.
+//
+// #import shared/frame
 
 const WORKGROUP_ROWS = 8u;
 

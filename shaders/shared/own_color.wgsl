@@ -1,4 +1,9 @@
-// The colours of voxels in channels of which some have colours of voxels' own (SPEC §10). A stage that includes this includes `colors` and `ramps`.
+// The colours of voxels in channels of which some have colours of voxels' own (SPEC §10).
+// The stage declares `control_points`.
+//
+// #import shared/colors
+// #import shared/frame
+// #import shared/ramps
 
 // The colour and A of a voxel, given by its index, in a channel; a given colour and 1 if its voxels have none of their own.
 fn own_color(channel: u32, index: u32, given: vec3f) -> vec4f {

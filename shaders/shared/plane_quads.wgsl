@@ -1,5 +1,10 @@
-// Quads of voxels that are drawn onto a slab plane (SPEC §9). A stage that includes this includes `planes`, `field_voxel`, `corners` and `brick`, and
-// declares `sheet_group`.
+// Quads of voxels that are drawn onto a slab plane (SPEC §9).
+// The stage declares `planes` and `sheet_group`.
+//
+// #import shared/corners
+// #import shared/field_voxel
+// #import shared/frame
+// #import shared/planes
 
 // Where a voxel's quad lies.
 struct QuadOnPlane {

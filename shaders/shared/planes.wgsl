@@ -1,5 +1,9 @@
 // The position of kernels on slab planes, and the scale of the numbers that stand for values (SPEC §9); `gpu::layout::FieldPlanes` documents the
-// fields. A stage that includes this declares `planes: FieldPlanes`.
+// fields.
+// The stage declares `planes`.
+//
+// #import shared/frame
+
 struct FieldPlanes {
     axes: array<vec4f, 3>,
     step: vec4f,

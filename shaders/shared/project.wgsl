@@ -1,3 +1,7 @@
+// The place of a voxel on the screen.
+//
+// #import shared/frame
+
 // A voxel's pixel coordinates, sheet depth, and depth from the eye.
 fn project(voxel: vec3u) -> vec4f {
     return on_screen(homogeneous(vec4f(vec3f(voxel), 1.0)));

@@ -1,5 +1,10 @@
-// The control points of all ramps, searched in memory, and the ramps of a voxel (SPEC §3). The stage declares `control_points`, and `labels`, a
-// texture array that `gpu::volume_texture` folds, of the labels of all segmented channels, and includes `texels`.
+// The control points of all ramps, searched in memory, and the ramps of a voxel (SPEC §3). `labels` is a texture array that `gpu::volume_texture`
+// folds, of the labels of all segmented channels.
+// The stage declares `control_points` and `labels`.
+//
+// #import shared/frame
+// #import shared/shading
+// #import shared/texels
 
 // Whether any label has its own ramps.
 override LABELS: bool = false;

@@ -1,5 +1,13 @@
-// The look of a channel's values and gradients on a pixel's ray (SPEC §§9, 10). A stage that includes this declares what `cells`, `channels`, `planes`,
-// `ramps` and `slab_integral` need.
+// The look of a channel's values and gradients on a pixel's ray (SPEC §§9, 10).
+// The stage declares `control_points`.
+//
+// #import shared/cells
+// #import shared/frame
+// #import shared/ramps
+// #import shared/shading
+// #import shared/slab_integral
+// #import shared/texels
+// #import shared/volume
 
 // Whether voxels of any channel have colours of their own.
 override OWN_COLORS: bool = false;

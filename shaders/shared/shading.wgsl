@@ -1,4 +1,8 @@
 // Classification and shading (SPEC §3).
+//
+// #import shared/frame
+// #import shared/project
+// #import shared/volume
 
 // The value on the line between two control points.
 fn between(a: vec4f, b: vec4f, value: f32) -> vec3f {

@@ -1,5 +1,18 @@
-// The slab between two planes at a pixel: what one channel adds to the pixel there, and what pixels carry from plane to plane (SPEC §§9, 10). A stage
-// that includes this includes `seen`, `first_surface` and `means`, and declares `COMPOSITING`, `CUT`, `carried` and `draws_front_to_back`.
+// The slab between two planes at a pixel: what one channel adds to the pixel there, and what pixels carry from plane to plane (SPEC §§9, 10).
+// The stage declares `COMPOSITING`, `CUT`, `carried`, `control_points`, `cut` and `draws_front_to_back`.
+//
+// #import shared/cells
+// #import shared/channels
+// #import shared/compositing
+// #import shared/cut
+// #import shared/field_voxel
+// #import shared/first_surface
+// #import shared/frame
+// #import shared/planes
+// #import shared/ramps
+// #import shared/seen
+// #import shared/shading
+// #import shared/slab_integral
 
 // What pixels carry from plane to plane, as bits: for every channel a record of each pixel, then for every channel whose voxels have colours of their own.
 // A channel's record: the number on the previous plane, and there its gradient in numbers per `unit`. For `maximum` and `minimum` the gradient is packed

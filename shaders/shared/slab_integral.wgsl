@@ -1,6 +1,8 @@
 // The transfer function integrated from value to value (SPEC §9; Engel, Kraus, Ertl 2001), read from a table that `after::slab_integral` makes and
-// describes. A stage that includes this declares `control_points` and includes `shading`. Values are given as the numbers that
-// `after::normalization` makes of them.
+// describes. Values are given as the numbers that `after::normalization` makes of them.
+// The stage declares `control_points`.
+//
+// #import shared/shading
 
 // The means of the transfer function over a slab's values.
 struct SlabIntegral {

@@ -1,6 +1,9 @@
 // The places of voxels in texture arrays that `gpu::volume_texture` folds. Where an array holds numbers of several channels, one channel follows the
 // other. Of a volume that is read while it is drawn an array has only some pages, cubes of voxels, in slots (`headless::boxed::page_pool`). Then voxels are counted
-// page by page, and the texture `pages`, which the stage declares, has the slot of every page of every channel.
+// page by page, and the texture `pages` has the slot of every page of every channel.
+// The stage declares `pages`.
+//
+// #import shared/frame
 
 // The bits of a voxel's place in its page along each axis; 0 where the array has all voxels.
 override PAGE_BITS: u32 = 0u;

@@ -1,5 +1,11 @@
 // Footprint quads of kernels that are each turned to their own ray, with every section mapped at its own depth (§3.3.2, end of §4.2), for
 // `splat_perspective` and `sample`.
+//
+// #import shared/brick
+// #import shared/corners
+// #import shared/footprints
+// #import shared/frame
+// #import shared/local_ray
 
 // The data that the fragments of a quad share.
 struct Quad {

@@ -1,4 +1,8 @@
-// The volume's values and gradients. The stage declares `values`, a texture array that `gpu::volume_texture` folds, and includes `texels`.
+// The volume's values and gradients. `values` is a texture array that `gpu::volume_texture` folds.
+// The stage declares `values`.
+//
+// #import shared/frame
+// #import shared/texels
 
 // Whether any voxel is a hole (SPEC §3); then values are stored as the bits of an f32.
 override HOLES: bool = false;

@@ -78,6 +78,7 @@ fn every_shader_validates() {
 fn errors_name_the_file_and_the_line() {
     let broken = Shader {
         stage: "broken",
+        variant: &[],
         files: &[
             ("shared/one.wgsl", "fn first() {}\n\n"),
             ("broken.wgsl", "fn second() {}\nfn third() { nothing(); }\n"),
