@@ -1,0 +1,96 @@
+//! The library's modules depend on one another in one direction.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+/// The modules of the library at its top level, each with those that its code names; tests at the end of a file do not count.
+fn dependencies() -> BTreeMap<String, BTreeSet<String>> {
+    fn collect(path: &Path, names: &mut BTreeSet<String>) {
+        if path.is_dir() {
+            fs::read_dir(path).unwrap().for_each(|entry| collect(&entry.unwrap().path(), names));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(path).unwrap();
+            let code = text.lines().take_while(|line| *line != "#[cfg(test)]");
+            for line in code.filter(|line| !line.trim_start().starts_with("//")) {
+                let mentions = line.split("crate::").skip(1);
+                names.extend(mentions.map(|rest| rest.split(|c: char| !c.is_alphanumeric() && c != '_')).map(
+                    |mut words| {
+                        // A list in braces would hide modules from this test.
+                        let name = words.next().unwrap_or_default();
+                        assert!(!name.is_empty(), "{}: {line}", path.display());
+                        name.to_owned()
+                    },
+                ));
+            }
+        }
+    }
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = BTreeMap::new();
+    for entry in fs::read_dir(source).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        if !["lib", "bin"].contains(&name.as_str()) {
+            collect(&path, found.entry(name).or_default());
+        }
+    }
+    let modules: BTreeSet<String> = found.keys().cloned().collect();
+    for (name, used) in &mut found {
+        used.retain(|other| other != name && modules.contains(other));
+    }
+    found
+}
+
+#[test]
+fn no_modules_import_each_other_in_a_cycle() {
+    let mut rest = dependencies();
+    let count: usize = rest.values().map(BTreeSet::len).sum();
+    assert!(rest.len() > 15 && count > 80, "{} modules with {count} dependencies", rest.len());
+    // Modules that depend on none of the rest are removed until none is left.
+    while !rest.is_empty() {
+        let free: Vec<String> = rest.iter().filter(|(_, used)| used.is_empty()).map(|(name, _)| name.clone()).collect();
+        assert!(!free.is_empty(), "these depend on each other in a cycle, or on modules that do: {rest:#?}");
+        for name in free {
+            rest.remove(&name);
+            for used in rest.values_mut() {
+                used.remove(&name);
+            }
+        }
+    }
+}
+
+/// The standard library's functions are the system's, whose last bits differ between machines (SPEC §12). What only the f64 evaluation, the program's texts and the
+/// report of a comparison need may use them.
+#[test]
+fn functions_of_numbers_are_those_of_libm() {
+    const FUNCTIONS: [&str; 21] = [
+        "sin", "cos", "tan", "sin_cos", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh", "exp", "exp2",
+        "exp_m1", "ln", "ln_1p", "log2", "log10", "powf", "cbrt", "hypot",
+    ];
+    const EXEMPT: [&str; 3] = ["src/bin", "src/reference", "src/golden/comparison.rs"];
+    fn scan(root: &Path, path: &Path, lines: &mut usize, found: &mut Vec<String>) {
+        if EXEMPT.iter().any(|exempt| path == root.join(exempt)) {
+            return;
+        }
+        if path.is_dir() {
+            fs::read_dir(path).unwrap().for_each(|entry| scan(root, &entry.unwrap().path(), lines, found));
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            let text = fs::read_to_string(path).unwrap();
+            for line in text.lines().take_while(|line| *line != "#[cfg(test)]") {
+                *lines += 1;
+                // Called, or named for another function to call.
+                let uses = |function: &&str| {
+                    line.contains(&format!(".{function}(")) || line.contains(&format!("f64::{function})"))
+                };
+                if FUNCTIONS.iter().any(uses) {
+                    found.push(format!("{}: {line}", path.display()));
+                }
+            }
+        }
+    }
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let (mut lines, mut found) = (0, Vec::new());
+    scan(root, &root.join("src"), &mut lines, &mut found);
+    assert!(lines > 20_000, "only {lines} lines");
+    assert!(found.is_empty(), "{found:#?}");
+}
