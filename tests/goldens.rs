@@ -4,12 +4,12 @@
 //! `SHEETSPLAT_SIMD` names). Each rasterizer on Mesa's lavapipe (or on the adapter that `SHEETSPLAT_TEST_ADAPTER` names) is held to them with a tolerance:
 //! f32 sums are taken in other orders there, and lavapipe's approximate reciprocals differ between processors. A failing picture and its
 //! differences are left in `target/goldens`. `SHEETSPLAT_BLESS=all`, or the names of scenes separated by commas, rewrites the goldens that fail, and only those.
-#![cfg(all(feature = "golden", feature = "cpu"))]
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 #[cfg(feature = "gpu")]
 #[path = "common/adapter.rs"]
 mod adapter;
+mod golden_macro;
 mod golden_scenes;
 
 use std::path::{Path, PathBuf};
@@ -84,7 +84,8 @@ fn failures() -> PathBuf {
 fn the_native_backend_draws_the_goldens_byte_by_byte() {
     if let Bless::Names(names) = Bless::from_env().unwrap() {
         for name in names {
-            let is_known = name == COLORS || SCENES.iter().any(|scene| scene.0 == name);
+            let is_known =
+                [COLORS, golden_macro::GRADIENT].contains(&name.as_str()) || SCENES.iter().any(|scene| scene.0 == name);
             assert!(is_known, "{}: no scene \"{name}\"", Bless::VARIABLE);
         }
     }

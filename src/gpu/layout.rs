@@ -1,4 +1,4 @@
-//! Every type shared by Rust and WGSL. `tests/layout.rs` compares field names, offsets and sizes with the shaders.
+//! Every type shared by Rust and WGSL. `tests/house/layout.rs` compares field names, offsets and sizes with the shaders.
 
 use bytemuck::{Pod, Zeroable};
 

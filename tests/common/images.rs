@@ -53,3 +53,8 @@ pub(crate) fn psnr(a: &[[f32; 4]], b: &[[f32; 4]], background: [f32; 4], least: 
     assert!(a.len() >= least, "only {} pixels show anything", a.len());
     if a.is_empty() { f64::INFINITY } else { compare::decibels(rms_of(&a, &b, 4)) }
 }
+
+/// The bits of every channel.
+pub(crate) fn bits(image: &Image) -> Vec<u32> {
+    image.pixels.as_flattened().iter().map(|channel| channel.to_bits()).collect()
+}

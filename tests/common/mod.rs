@@ -2,25 +2,21 @@
 
 pub(crate) mod adapter;
 pub(crate) mod compare;
+#[cfg(feature = "gpu")]
+pub(crate) mod devices;
 pub(crate) mod images;
 pub(crate) mod shared;
 pub(crate) mod store;
+#[cfg(feature = "gpu")]
 pub(crate) mod surfaces;
-
-use std::sync::LazyLock;
+pub(crate) mod values;
 
 use glam::{DVec3, DVec4, UVec3};
-use sheetsplat::DeviceRequirements;
-use sheetsplat::cpu;
-use sheetsplat::headless::{GpuHeadless, HeadlessOptions, Rendering};
 use sheetsplat::scene::{ImageSettings, Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Camera, Projection};
-use sheetsplat::settings::{Compositing, FootprintForm, Rasterizer, Splatting};
+use sheetsplat::settings::{Compositing, Rasterizer, Splatting};
 use sheetsplat::volume::{Grid, Volume};
-use sheetsplat::wgpu::{Features, Limits, TextureFormat};
-
-use adapter::adapter;
 
 /// The maximum relative error of rounding to the nearest f32.
 pub(crate) const F32: f64 = 1.0 / (1 << 24) as f64;
@@ -47,72 +43,6 @@ pub(crate) const BY_MEANS: [Compositing; 4] =
 
 /// Both rasterizers, whatever `auto` would choose.
 pub(crate) const RASTERIZERS: [Rasterizer; 2] = [Rasterizer::Quads, Rasterizer::Tiles];
-
-/// Everything that draws whole frames: the rasterizers on the GPU, and the native backend.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Drawing {
-    /// A GPU's rasterizer.
-    By(Rasterizer),
-    /// The native backend.
-    Native,
-}
-
-/// All of them.
-pub(crate) const DRAWINGS: [Drawing; 3] =
-    [Drawing::By(Rasterizer::Quads), Drawing::By(Rasterizer::Tiles), Drawing::Native];
-
-impl Drawing {
-    /// Draws a frame, which must succeed.
-    pub(crate) fn render(self, gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> Rendering {
-        let Self::By(rasterizer) = self else { return cpu::render(volume.clone(), scene).unwrap() };
-        let splatting = Splatting { rasterizer, ..scene.splatting };
-        gpu.render_volume(volume.clone(), &Scene { splatting, ..scene.clone() }).unwrap()
-    }
-
-    /// Whether sheets are summed in f16, or amounts rounded to it.
-    pub(crate) fn rounds_to_f16(self) -> bool {
-        self == Self::By(Rasterizer::Quads)
-    }
-}
-
-/// Both rasterizers, each with all footprint forms that it supports.
-pub(crate) const FORMS: [(Rasterizer, FootprintForm); 3] = [
-    (Rasterizer::Quads, FootprintForm::SummedArea),
-    (Rasterizer::Quads, FootprintForm::Sections),
-    (Rasterizer::Tiles, FootprintForm::SummedArea),
-];
-
-/// Everything that draws whole frames, each with all footprint forms that it supports.
-pub(crate) fn drawn_forms() -> impl Iterator<Item = (Drawing, FootprintForm)> {
-    let native = (Drawing::Native, FootprintForm::SummedArea);
-    FORMS.into_iter().map(|(rasterizer, form)| (Drawing::By(rasterizer), form)).chain([native])
-}
-
-/// The options of a device on the adapter that the tests draw on.
-pub(crate) fn on_adapter() -> HeadlessOptions {
-    HeadlessOptions::default().with_adapter(adapter())
-}
-
-/// A device as the program opens it, with f32 sheets. All tests of a process share it, because compiling its pipelines takes longer than most tests do. The
-/// test fails without a GPU or software driver.
-pub(crate) fn gpu() -> &'static GpuHeadless {
-    static SHARED: LazyLock<GpuHeadless> = LazyLock::new(new_gpu);
-    &SHARED
-}
-
-/// Such a device for one test alone.
-pub(crate) fn new_gpu() -> GpuHeadless {
-    let options = on_adapter().with_sheet_format(TextureFormat::Rgba32Float);
-    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("the adapter that the tests draw on: {error}"))
-}
-
-/// A device with WebGPU's default limits, except that storage bindings have at most `bytes` bytes.
-pub(crate) fn gpu_with_small_bindings(bytes: u64) -> GpuHeadless {
-    let limits = Limits { max_storage_buffer_binding_size: bytes, ..Limits::default() };
-    let requirements = DeviceRequirements { features: Features::FLOAT32_BLENDABLE, limits };
-    let options = on_adapter().with_requirements(requirements).with_sheet_format(TextureFormat::Rgba32Float);
-    GpuHeadless::new(&options).unwrap_or_else(|error| panic!("the adapter that the tests draw on: {error}"))
-}
 
 /// Four f32 per pixel, as read back.
 pub(crate) fn pixels(bytes: &[u8]) -> Vec<DVec4> {

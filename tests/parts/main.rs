@@ -3,7 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "tests")]
 
 mod channels;
-#[expect(dead_code, reason = "not every file needs all of it")]
+#[expect(dead_code, reason = "not every program needs all of it")]
 #[path = "../common/mod.rs"]
 mod common;
 mod files;
