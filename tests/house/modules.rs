@@ -1,8 +1,4 @@
-<<<<<<< HEAD:tests/modules.rs
 //! Modules depend on one another in one direction: those at the top level without exception, files with a few that are written down.
-=======
-//! The library's modules depend on one another in one direction.
->>>>>>> wt-tests:tests/house/modules.rs
 
 mod circles;
 
