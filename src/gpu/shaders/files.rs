@@ -1,6 +1,6 @@
 //! The WGSL files below `shaders/`, as they are in the program.
 
-use super::imports::{self, File};
+use super::imports::{self, File, Numbers};
 
 /// The text of a file.
 #[cfg(not(target_arch = "wasm32"))]
@@ -40,7 +40,7 @@ macro_rules! files {
 }
 
 /// Every file. Only those that stages are assembled from are in a program.
-pub(super) const FILES: &[File] = files![
+pub(super) const FILES: &[File; 83] = files![
     "classify" "clear" "compact" "composite" "cull_bricks" "cull_voxels" "field" "field_colors" "first_hit" "gather"
     "gather_planes" "join" "occlude" "resolve" "sample" "shade" "splat" "splat_perspective" "tiles" "values"
     "gather/amounts" "gather/bits" "gather/economic_kernel" "gather/economies" "gather/group" "gather/kernel"
@@ -55,6 +55,9 @@ pub(super) const FILES: &[File] = files![
     "shared/scan" "shared/seen" "shared/shading" "shared/sheets" "shared/slab" "shared/slab_integral" "shared/splat"
     "shared/splatted_color" "shared/tally" "shared/texels" "shared/tile_list" "shared/turned_quads" "shared/volume"
 ];
+
+/// What each of them imports.
+pub(super) const IMPORTS: &Numbers<{ FILES.len() }> = &imports::numbers(FILES);
 
 #[cfg(target_arch = "wasm32")]
 mod comments {

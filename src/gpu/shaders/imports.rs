@@ -17,8 +17,8 @@ pub(super) const MOST: usize = 32;
 pub(super) const fn of(text: &'static str) -> ([&'static str; MOST], usize) {
     let (mut names, mut count, mut rest) = ([""; MOST], 0, text);
     while starts_with(rest, "//") {
-        let mut end = 0;
-        while rest.as_bytes()[end] != b'\n' {
+        let (bytes, mut end) = (rest.as_bytes(), 0);
+        while bytes[end] != b'\n' {
             end += 1;
         }
         if starts_with(rest, "// #import ") {
@@ -42,6 +42,35 @@ const fn is_same(a: &[u8], b: &[u8]) -> bool {
     a.len() == b.len() && left == 0
 }
 
+/// The files' imports by number, found once for all shaders: the compiler is slow at comparing names. `VARYING` stands for an import that is no file's name.
+pub(super) type Numbers<const N: usize> = [[usize; MOST]; N];
+
+const VARYING: usize = usize::MAX;
+
+pub(super) const fn numbers<const N: usize>(files: &[File; N]) -> Numbers<N> {
+    let (mut numbers, mut file) = ([[VARYING; MOST]; N], 0);
+    while file < N {
+        let (imports, mut at) = (files[file].imports, 0);
+        while at < imports.len() {
+            numbers[file][at] = number_of(files, imports[at]);
+            at += 1;
+        }
+        file += 1;
+    }
+    numbers
+}
+
+const fn number_of<const N: usize>(files: &[File; N], name: &str) -> usize {
+    let mut number = 0;
+    while number < N {
+        if files[number].name.len() == name.len() && is_same(files[number].name.as_bytes(), name.as_bytes()) {
+            return number;
+        }
+        number += 1;
+    }
+    VARYING
+}
+
 /// Some of `N` files, by their numbers, in the order in which a source has them: each once, and behind those that it imports, except where these
 /// import it, too.
 pub(super) struct Order<const N: usize> {
@@ -52,41 +81,48 @@ pub(super) struct Order<const N: usize> {
 
 impl<const N: usize> Order<N> {
     /// A file and all that it needs. A variant says which files stand for imports that are no files' names.
-    pub(super) const fn new(files: &[File], first: &str, variant: &[(&str, &str)]) -> Self {
-        Self { numbers: [0; N], count: 0, is_begun: [false; N] }.with(files, first, variant)
-    }
-
-    /// With what an import means.
-    const fn with(self, files: &[File], import: &str, variant: &[(&str, &str)]) -> Self {
-        let (mut order, mut at, mut is_file) = (self, 0, true);
-        while at < variant.len() {
-            if is_same(variant[at].0.as_bytes(), import.as_bytes()) {
-                order = order.with_file(files, variant[at].1, variant);
-                is_file = false;
-            }
-            at += 1;
-        }
-        if is_file { order.with_file(files, import, variant) } else { order }
-    }
-
-    const fn with_file(self, files: &[File], name: &str, variant: &[(&str, &str)]) -> Self {
-        let (mut order, number, mut at) = (self, number_of(files, name), 0);
-        // A file that is begun but not in the order yet imports itself, in a circle.
-        if order.is_begun[number] {
-            return order;
-        }
-        order.is_begun[number] = true;
-        while at < files[number].imports.len() {
-            order = order.with(files, files[number].imports[at], variant);
-            at += 1;
-        }
-        order.numbers[order.count] = number;
-        order.count += 1;
+    pub(super) const fn new(files: &[File; N], imports: &Numbers<N>, first: &str, variant: &[(&str, &str)]) -> Self {
+        let mut order = Self { numbers: [0; N], count: 0, is_begun: [false; N] };
+        order.add(files, imports, number_of(files, first), variant);
         order
     }
 
+    const fn add(&mut self, files: &[File; N], imports: &Numbers<N>, number: usize, variant: &[(&str, &str)]) {
+        // A file that is begun but not in the order yet imports itself, in a circle.
+        if self.is_begun[number] {
+            return;
+        }
+        self.is_begun[number] = true;
+        let mut at = 0;
+        while at < files[number].imports.len() {
+            if imports[number][at] == VARYING {
+                self.add_variants(files, imports, files[number].imports[at], variant);
+            } else {
+                self.add(files, imports, imports[number][at], variant);
+            }
+            at += 1;
+        }
+        self.numbers[self.count] = number;
+        self.count += 1;
+    }
+
+    /// Adds the files that stand for an import. If there are none, the compiler's message says the import.
+    const fn add_variants(&mut self, files: &[File; N], imports: &Numbers<N>, import: &str, variant: &[(&str, &str)]) {
+        let (mut at, mut is_known) = (0, false);
+        while at < variant.len() {
+            if is_same(variant[at].0.as_bytes(), import.as_bytes()) {
+                self.add(files, imports, number_of(files, variant[at].1), variant);
+                is_known = true;
+            }
+            at += 1;
+        }
+        if !is_known {
+            panic!("{}", import);
+        }
+    }
+
     /// The files' paths and texts.
-    pub(super) const fn parts<const M: usize>(&self, files: &[File]) -> [(&'static str, &'static str); M] {
+    pub(super) const fn parts<const M: usize>(&self, files: &[File; N]) -> [(&'static str, &'static str); M] {
         let (mut parts, mut at) = ([("", ""); M], 0);
         while at < M {
             let file = &files[self.numbers[at]];
@@ -95,18 +131,6 @@ impl<const N: usize> Order<N> {
         }
         parts
     }
-}
-
-/// The number of the file with a name. If there is none, the compiler's message says the name.
-const fn number_of(files: &[File], name: &str) -> usize {
-    let mut number = 0;
-    while number < files.len() {
-        if is_same(files[number].name.as_bytes(), name.as_bytes()) {
-            return number;
-        }
-        number += 1;
-    }
-    panic!("{}", name)
 }
 
 #[cfg(test)]
@@ -127,7 +151,7 @@ mod tests {
     ];
 
     fn order(first: &str, variant: &[(&str, &str)]) -> Vec<&'static str> {
-        let order = Order::<6>::new(&FILES, first, variant);
+        let order = Order::new(&FILES, &numbers(&FILES), first, variant);
         order.parts::<6>(&FILES)[..order.count].iter().map(|&(path, _)| path).collect()
     }
 

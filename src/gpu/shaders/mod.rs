@@ -4,7 +4,7 @@
 mod files;
 mod imports;
 
-use files::FILES;
+use files::{FILES, IMPORTS};
 use imports::Order;
 
 /// A stage's name, and the files that its source is assembled from. Each file is in the program once.
@@ -25,7 +25,7 @@ macro_rules! shader {
     };
     ($stage:literal from $first:literal $(, $import:literal = $file:literal)*) => {{
         const VARIANT: &[(&str, &str)] = &[$(($import, $file)),*];
-        const ORDER: Order<{ FILES.len() }> = Order::new(FILES, $first, VARIANT);
+        const ORDER: Order<{ FILES.len() }> = Order::new(FILES, IMPORTS, $first, VARIANT);
         const PARTS: [(&str, &str); ORDER.count] = ORDER.parts(FILES);
         Shader { stage: $stage, variant: VARIANT, files: &PARTS }
     }};
