@@ -13,25 +13,8 @@ use circles::Files;
 /// The folders of crates, without `bin`, and the circles of files in each: a file of the circle, and the number of its files. Circles make it hard to read
 /// one file without the others, so they may only shrink.
 const CIRCLES: [(&str, &[(&str, usize)]); 3] = [
-    (
-        "src",
-        &[
-            ("appearance", 4),
-            ("cpu", 24),
-            ("golden/bless", 2),
-            ("golden/file", 2),
-            ("gpu/coefficients", 2),
-            ("headless", 13),
-            ("image", 4),
-            ("part", 3),
-            ("part/exr", 3),
-            ("pass/clear", 2),
-            ("reference", 18),
-            ("renderer", 2),
-            ("scene", 7),
-        ],
-    ),
-    ("src/bin/sheetsplat", &[("adapters", 18), ("annotate", 4)]),
+    ("src", &[("cpu", 24), ("headless", 13), ("reference", 18), ("renderer", 2), ("scene", 7)]),
+    ("src/bin/sheetsplat", &[]),
     ("crates/volume/src", &[("zarr/blosc", 2)]),
 ];
 
@@ -184,6 +167,6 @@ fn functions_of_numbers_are_those_of_libm() {
     for folder in ["src", "crates/volume/src"] {
         scan(root, &root.join(folder), &mut lines, &mut found);
     }
-    assert!(lines > 35_000, "only {lines} lines");
+    assert!(lines > 45_000, "only {lines} lines");
     assert!(found.is_empty(), "{found:#?}");
 }
