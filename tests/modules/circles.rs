@@ -141,7 +141,7 @@ fn reached<'a>(edges: &'a BTreeMap<&Module, BTreeSet<Module>>, from: &Module) ->
 impl File {
     fn parse(text: &str) -> Self {
         let is_test = |line: &str| line == "#[cfg(test)]" || line.starts_with("#[cfg(all(test");
-        let mut lines = text.lines().take_while(|line| !is_test(line)).map(without_comment);
+        let mut lines = text.lines().take_while(|line| !is_test(line)).map(code_of);
         let (mut imports, mut macros, mut others, mut inline_end) = (Vec::new(), Vec::new(), String::new(), None);
         while let Some(line) = lines.next() {
             let indent = &line[..line.len() - line.trim_start().len()];
@@ -172,8 +172,15 @@ impl File {
     }
 }
 
-fn without_comment(line: &str) -> String {
-    line.split("//").next().unwrap_or_default().trim_end().to_owned()
+/// A line without its comment and paths of visibility.
+fn code_of(line: &str) -> String {
+    let code = line.split("//").next().unwrap_or_default().trim_end();
+    let Some((before, (_, after))) =
+        code.split_once("pub(in ").map(|(before, rest)| (before, rest.split_once(')').unwrap_or_default()))
+    else {
+        return code.to_owned();
+    };
+    format!("{before}pub{after}")
 }
 
 fn without_visibility(statement: &str) -> &str {
