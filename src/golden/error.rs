@@ -108,6 +108,6 @@ impl Display for Failure {
             Ok(folder) => writeln!(f, "left: {}-*", folder.join(name).display())?,
             Err(error) => writeln!(f, "nothing left: {error}")?,
         }
-        write!(f, "{}={name} makes the actual image the golden, if it is right", VARIABLE)
+        write!(f, "{VARIABLE}={name} makes the actual image the golden, if it is right")
     }
 }
