@@ -3,11 +3,13 @@
 pub mod categories;
 pub(crate) mod channel_display;
 mod colormap;
+mod haze;
 mod hounsfield;
 mod object;
 mod padding;
 mod preset;
 mod quantile;
+mod shown_range;
 mod suggestion;
 mod xray;
 
@@ -16,10 +18,11 @@ use glam::DVec3;
 pub use colormap::Colormap;
 pub use preset::Preset;
 pub use quantile::{histogram, quantiles};
+pub use shown_range::shown_range;
 
-use crate::lists::iso_range::ValueSet;
 use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Volume;
+use haze::constant;
 use object::Object;
 
 impl TransferFunction {
@@ -60,20 +63,6 @@ fn surface(volume: &Volume) -> TransferFunction {
         }
         None => constant(0.5),
     }
-}
-
-/// A grey haze, for constant volumes.
-fn constant(opacity: f64) -> TransferFunction {
-    TransferFunction::by_value(Ramp::through(vec![(0.0, DVec3::splat(0.7))]), Ramp::through(vec![(0.0, opacity)]))
-}
-
-/// The range of values that a volume shows under a transfer function: the 0.5 % and 99.5 % quantiles of those with an opacity above 0 in
-/// an iso-range, so that outliers do not use up most of a colour map. `None` if nothing shows. Tables of labels are ignored.
-pub fn shown_range(volume: &Volume, transfer: &TransferFunction) -> Option<[f64; 2]> {
-    const TAIL: f64 = 0.005;
-    let shown = ValueSet::of(transfer);
-    let ends = quantiles(volume.values(), |value| shown.contains(value), [TAIL, 1.0 - TAIL]);
-    ends.map(|ends| ends.map(f64::from))
 }
 
 /// The colour of a channel among several, if nothing states it: magenta and green for two, else cyan, magenta, yellow, and then red, green, blue

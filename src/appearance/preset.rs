@@ -3,10 +3,11 @@
 use glam::{DVec3, UVec3};
 
 use super::colormap::Colormap;
+use super::haze::constant;
 use super::hounsfield::Hounsfield;
 use super::object::Object;
 use super::quantile::quantiles;
-use super::{categories, channel_display, constant, xray};
+use super::{categories, channel_display, xray};
 #[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::settings::shading::Shading;

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::constant;
+use super::haze::constant;
 use super::object::Object;
 use super::quantile::quantiles;
 use crate::settings::transfer_function::{Ramp, TransferFunction};

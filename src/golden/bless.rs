@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::GoldenError;
+use super::error::{GoldenError, VARIABLE};
 
 /// The goldens that are rewritten if their image fails.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -19,7 +19,7 @@ pub enum Bless {
 
 impl Bless {
     /// The environment variable: `all`, or names separated by commas. Unset or empty, it blesses no golden.
-    pub const VARIABLE: &str = "SHEETSPLAT_BLESS";
+    pub const VARIABLE: &str = VARIABLE;
 
     /// Reads the environment variable.
     ///

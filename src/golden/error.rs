@@ -3,8 +3,11 @@
 use std::fmt::{Display, Formatter};
 use std::path::PathBuf;
 
-use super::{Bless, Comparison, ComparisonError, LaxTolerance, MadeOn};
+use super::{Comparison, ComparisonError, LaxTolerance, MadeOn};
 use crate::image::ImageError;
+
+/// The environment variable that says which goldens may be rewritten.
+pub(super) const VARIABLE: &str = "SHEETSPLAT_BLESS";
 
 /// Why an image was not compared with its golden, or differs from it.
 #[derive(Debug, thiserror::Error)]
@@ -17,7 +20,7 @@ pub enum GoldenError {
         found: String,
     },
     /// The environment variable is invalid.
-    #[error("{variable}: {0}", variable = Bless::VARIABLE)]
+    #[error("{variable}: {0}", variable = VARIABLE)]
     Bless(Box<GoldenError>),
     /// The tolerance exceeds the widest one.
     #[error(transparent)]
@@ -105,6 +108,6 @@ impl Display for Failure {
             Ok(folder) => writeln!(f, "left: {}-*", folder.join(name).display())?,
             Err(error) => writeln!(f, "nothing left: {error}")?,
         }
-        write!(f, "{}={name} makes the actual image the golden, if it is right", Bless::VARIABLE)
+        write!(f, "{VARIABLE}={name} makes the actual image the golden, if it is right")
     }
 }

@@ -75,6 +75,7 @@ mod bless;
 mod comparison;
 mod error;
 mod file;
+mod made_on;
 mod site;
 mod subject;
 mod tolerance;
@@ -85,9 +86,10 @@ use std::path::PathBuf;
 pub use bless::Bless;
 pub use comparison::{Comparison, ComparisonError};
 pub use error::{Failure, GoldenError, Reason};
+pub use made_on::MadeOn;
 #[doc(hidden)]
 pub use site::Site;
-pub use subject::{MadeOn, Picture, Subject};
+pub use subject::{Picture, Subject};
 pub use tolerance::{LaxTolerance, Tolerance};
 
 use crate::image::{Image, ImageError, PngDepth, output};

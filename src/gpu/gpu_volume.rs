@@ -8,6 +8,7 @@ use wgpu::{Device, Queue, TextureView};
 use crate::after::normalization::Normalization;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
+use crate::gpu::all_channels::one_after_the_other;
 use crate::gpu::coefficients::Coefficients;
 use crate::gpu::fault::scoped;
 use crate::gpu::ramps::Stored;
@@ -310,11 +311,4 @@ fn all_colors(volume: &Volume) -> Option<Cow<'_, [Texel]>> {
 /// The labels of all segmented channels.
 fn all_labels(volume: &Volume) -> Option<Cow<'_, [u16]>> {
     one_after_the_other(volume.channels().filter_map(Volume::labels))
-}
-
-/// The numbers of all channels that have any; `None` if no channel has.
-pub(super) fn one_after_the_other<'a, T: Copy>(mut channels: impl Iterator<Item = &'a [T]>) -> Option<Cow<'a, [T]>> {
-    let mut all = Cow::Borrowed(channels.next()?);
-    channels.for_each(|channel| all.to_mut().extend_from_slice(channel));
-    Some(all)
 }

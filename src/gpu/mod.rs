@@ -1,5 +1,6 @@
 //! The passes' common parts: the device's capabilities and faults, memory layouts, shader sources, targets, counts.
 
+mod all_channels;
 pub mod bindings;
 pub mod brick_lists;
 pub mod classified_volume;

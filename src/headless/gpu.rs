@@ -1,17 +1,15 @@
 //! Rendering on a GPU without a host. Only this module creates devices, submits and waits.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use web_time::Instant;
 use wgpu::{Adapter, Device, Queue, TextureFormat};
 
 use super::device::{self, driver_name};
-use super::{
-    Backend, Error, HeadlessOptions, Rendering, content, load_and_render, milliseconds_since, readback, view_and_draw,
-};
+use super::readback::{self, wait};
+use super::timed::{load_and_render, milliseconds_since, view_and_draw};
+use super::{Backend, Error, HeadlessOptions, Rendering, content};
 use crate::error::RenderError;
-use crate::error::device::DeviceFault;
 use crate::error::setting::SettingError;
 use crate::gpu::counts::PendingCounts;
 use crate::gpu::device::{DeviceError, DeviceRequirements};
@@ -302,19 +300,6 @@ impl Drop for GpuHeadless {
     fn drop(&mut self) {
         // A software driver's threads must end before the process's memory is freed.
         let _ = wait(&self.device);
-    }
-}
-
-/// Waits until everything submitted is done.
-///
-/// # Errors
-/// If the device is lost.
-pub(super) fn wait(device: &Device) -> Result<(), RenderError> {
-    // wgpu panics where the driver loses the device meanwhile.
-    match catch_unwind(AssertUnwindSafe(|| device.poll(wgpu::PollType::wait_indefinitely()))) {
-        Ok(Ok(_)) => Ok(()),
-        Ok(Err(error)) => Err(RenderError::Readback(error.to_string())),
-        Err(_) => Err(DeviceFault::Lost.into()),
     }
 }
 

@@ -2,9 +2,10 @@
 
 use web_time::Instant;
 
+use super::Headless;
 use super::boxed::opaque_values;
+use super::timed::milliseconds_since;
 use super::view::HeadlessView;
-use super::{Headless, milliseconds_since};
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;

@@ -16,9 +16,8 @@ mod options;
 #[cfg(feature = "gpu")]
 pub mod readback;
 mod reference;
+mod timed;
 mod view;
-
-use web_time::Instant;
 
 use self::boxed::BoxedView;
 pub use self::error::Error;
@@ -26,6 +25,7 @@ pub use self::error::Error;
 pub use self::gpu::GpuHeadless;
 pub use self::options::HeadlessOptions;
 use self::reference::ReferenceView;
+use self::timed::{load_and_render, view_and_draw};
 pub use self::view::HeadlessView;
 use self::view::ViewBackend;
 #[cfg(feature = "cpu")]
@@ -39,7 +39,7 @@ pub use crate::rendering::{Backend, Rendering};
 use crate::scene::{OpenVolume, Scene};
 use crate::settings::window::Window;
 use crate::stats::Stats;
-use crate::volume::{StreamedVolume, Volume, VolumeError};
+use crate::volume::{StreamedVolume, Volume};
 
 /// Renders with one backend. On the GPU it opens its own device; on the CPU it needs no driver.
 #[derive(Debug)]
@@ -302,37 +302,4 @@ impl Headless {
             format!("one of the {} backend", self.backend()),
         )
     }
-}
-
-/// Opens a scene's volume and renders it by `render_volume`; the statistics hold the time of loading.
-fn load_and_render<V>(
-    scene: &Scene,
-    open: impl FnOnce(&Scene) -> Result<V, VolumeError>,
-    render_volume: impl FnOnce(V) -> Result<Rendering, RenderError>,
-) -> Result<Rendering, Error> {
-    // An invalid scene is refused before its volume is read.
-    scene.check().map_err(RenderError::from)?;
-    let start = Instant::now();
-    let volume = open(scene)?;
-    let load_ms = milliseconds_since(start);
-    let mut rendering = render_volume(volume)?;
-    rendering.stats.load_ms = load_ms;
-    Ok(rendering)
-}
-
-/// Sets up a view and draws its first frame; the statistics count the set-up as preparation.
-fn view_and_draw<View>(
-    view: impl FnOnce() -> Result<View, RenderError>,
-    draw: impl FnOnce(&mut View) -> Result<Rendering, RenderError>,
-) -> Result<Rendering, RenderError> {
-    let start = Instant::now();
-    let mut view = view()?;
-    let classify_ms = milliseconds_since(start);
-    let mut rendering = draw(&mut view)?;
-    rendering.stats.prepare_ms += classify_ms;
-    Ok(rendering)
-}
-
-fn milliseconds_since(start: Instant) -> f64 {
-    start.elapsed().as_secs_f64() * 1e3
 }

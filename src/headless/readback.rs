@@ -1,10 +1,12 @@
 //! Blocking readback of buffers and textures.
 
 use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use wgpu::{Buffer, BufferUsages, Device, Queue, Texture};
 
 use crate::error::RenderError;
+use crate::error::device::DeviceFault;
 
 /// The bytes of a buffer that has the usage `COPY_SRC`.
 ///
@@ -91,10 +93,23 @@ fn read(device: &Device, staging: &Buffer, use_bytes: impl FnOnce(&[u8])) -> Res
         // The receiver is gone only if polling failed, and that error is returned.
         let _ = sender.send(result);
     });
-    super::gpu::wait(device)?;
+    wait(device)?;
     let mapped = receiver.recv().map_err(|error| failed(error.to_string()))?;
     mapped.map_err(|error| failed(error.to_string()))?;
     use_bytes(&staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?);
     staging.unmap();
     Ok(())
+}
+
+/// Waits until everything submitted is done.
+///
+/// # Errors
+/// If the device is lost.
+pub(super) fn wait(device: &Device) -> Result<(), RenderError> {
+    // wgpu panics where the driver loses the device meanwhile.
+    match catch_unwind(AssertUnwindSafe(|| device.poll(wgpu::PollType::wait_indefinitely()))) {
+        Ok(Ok(_)) => Ok(()),
+        Ok(Err(error)) => Err(RenderError::Readback(error.to_string())),
+        Err(_) => Err(DeviceFault::Lost.into()),
+    }
 }

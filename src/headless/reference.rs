@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use web_time::Instant;
 
-use super::{Backend, Rendering, milliseconds_since};
+use super::timed::milliseconds_since;
+use super::{Backend, Rendering};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;

@@ -4,7 +4,17 @@ use std::io::Cursor;
 
 use ::png::{BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, EncodingError, Transformations};
 
-use super::{Image, PngDepth};
+use super::Image;
+
+/// Bits per channel of a PNG file.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PngDepth {
+    /// 8 bits.
+    #[default]
+    Eight,
+    /// 16 bits.
+    Sixteen,
+}
 
 /// The bytes of a file with these channels, red, green, blue and alpha for each pixel.
 pub(super) fn encode(image: &Image, depth: PngDepth) -> Result<Vec<u8>, EncodingError> {

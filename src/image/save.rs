@@ -2,18 +2,8 @@
 
 use std::path::Path;
 
-use super::{Format, Image, ImageError, exr, output, png};
+use super::{Format, Image, ImageError, PngDepth, exr, output, png};
 use crate::volume::npy;
-
-/// Bits per channel of a PNG file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum PngDepth {
-    /// 8 bits.
-    #[default]
-    Eight,
-    /// 16 bits.
-    Sixteen,
-}
 
 impl Image {
     /// Checks that [`Image::save`] knows the extension of a file, before a long render.

@@ -6,8 +6,9 @@ use std::path::Path;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::check::MAX_IMAGES;
 use super::mean::{MeanTables, shows_means};
-use super::{Identity, MAX_IMAGES, Part};
+use super::{Identity, Part};
 use crate::image::ImageError;
 use crate::image::channels::Joining;
 use crate::image::open::content;

@@ -12,8 +12,8 @@ use ::exr::prelude::{
 };
 
 use super::Part;
+use super::channels::{Decoded, channel_names, reserve, to_channels};
 use super::description::{from_json, to_json};
-use super::file::{Decoded, channel_names, reserve, to_channels};
 use crate::image::ImageError;
 use crate::image::open::{check_blocks, content};
 use crate::volume::Access;

@@ -6,8 +6,8 @@ use std::path::Path;
 use flate2::Crc;
 
 use super::Part;
+use super::channels::{Decoded, channel_names, to_channels};
 use super::description::{from_json, to_json};
-use super::file::{Decoded, channel_names, to_channels};
 use crate::image::ImageError;
 use crate::image::open::{content, of_volume};
 use crate::volume::{Access, SampleType, npy, npz};

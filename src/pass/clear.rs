@@ -2,7 +2,7 @@
 
 use wgpu::{BindGroup, Buffer, Device, RenderPipeline, ShaderStages, TextureFormat};
 
-use super::splat::sheets_of_a_group;
+use super::sheets::sheets_of_a_group;
 use crate::gpu::bindings::{Bindings, storage, uniform};
 use crate::gpu::layout::{Frame, TileList};
 use crate::gpu::render_pipeline::render_pipeline;

@@ -8,7 +8,8 @@ use wgpu::{
 };
 
 use super::clear::Clear;
-use super::splat::{added_to, quad_indices, record_quads, sheets_of_a_group};
+use super::sheets::{added_to, sheets_of_a_group};
+use super::splat::{quad_indices, record_quads};
 use crate::gpu::bindings::{Bindings, at_offset, storage, uniform};
 use crate::gpu::layout::{FieldPlanes, FieldVoxel, Frame, Indirect, SheetGroup};
 use crate::gpu::render_pipeline::render_pipeline;

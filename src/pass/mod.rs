@@ -19,6 +19,7 @@ pub mod occlude;
 pub mod resolve;
 pub mod sample;
 pub mod shade;
+mod sheets;
 pub mod splat;
 pub mod tiles;
 pub mod values;

@@ -6,7 +6,8 @@ use wgpu::{
     BindGroup, Buffer, CommandEncoder, Device, RenderPassTimestampWrites, RenderPipeline, TextureFormat, TextureView,
 };
 
-use super::splat::{added_to, quad_indices, sheets_of_a_group, splat_slots};
+use super::sheets::{added_to, sheets_of_a_group};
+use super::splat::{quad_indices, splat_slots};
 use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{Bindings, at_offset};
 use crate::gpu::footprint_texture::FootprintTexture;

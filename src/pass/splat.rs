@@ -9,11 +9,12 @@ use wgpu::{
 };
 
 use super::clear::Clear;
+use super::sheets::{added_to, sheets_of_a_group};
 use crate::geometry::footprint::{SUMMED_AREA_LAYERS, SUMMED_AREA_SIZE};
 use crate::gpu::bindings::{Bindings, Slot, at_offset, storage, texture, uniform, uploaded};
 use crate::gpu::footprint_texture::FootprintTexture;
 use crate::gpu::layout::{Frame, Indirect, QUADS, SheetGroup, Splat as SplatRecord};
-use crate::gpu::render_pipeline::{Attachments, render_pipeline};
+use crate::gpu::render_pipeline::render_pipeline;
 use crate::gpu::shaders;
 use crate::pass::cull::CullList;
 use crate::settings::splatting::FootprintForm;
@@ -167,25 +168,9 @@ pub(super) fn splat_slots() -> [(&'static str, Slot); 6] {
     ]
 }
 
-/// Blending that adds the drawn colour to the target's, multiplied by a factor.
-pub(super) fn added_to(there: wgpu::BlendFactor) -> wgpu::BlendState {
-    let component = wgpu::BlendComponent {
-        src_factor: wgpu::BlendFactor::One,
-        dst_factor: there,
-        operation: wgpu::BlendOperation::Add,
-    };
-    wgpu::BlendState { color: component, alpha: component }
-}
-
 /// The vertices 4q to 4q + 3 of quad q as two triangles, for an instance's quads.
 pub(super) fn quad_indices(device: &Device) -> Buffer {
     let indices: Vec<u16> = (0..QUADS).flat_map(|quad| [0, 1, 2, 2, 1, 3].map(|corner| 4 * quad + corner)).collect();
     let bytes: &[u8] = bytemuck::cast_slice(&indices);
     uploaded(device, "sheetsplat.quad_indices", bytes, bytes.len() as u64, wgpu::BufferUsages::INDEX)
-}
-
-/// All sheets of a group.
-pub(super) fn sheets_of_a_group(format: TextureFormat, sheets: u32, blend: Option<wgpu::BlendState>) -> Attachments {
-    let target = wgpu::ColorTargetState { format, blend, write_mask: wgpu::ColorWrites::ALL };
-    Attachments::colors(vec![target; sheets as usize])
 }

@@ -3,20 +3,22 @@
 
 pub mod after;
 mod before;
+mod buffer;
 pub mod composite;
+mod culled;
 pub mod cut;
 mod first_hit;
 pub mod footprint;
 pub mod geometry;
+mod host;
 pub mod means;
 pub mod ray_march;
 pub mod resolve;
+mod section;
 pub mod shading;
 pub mod sheets;
 pub mod splat;
 pub mod visibility;
-
-use glam::DVec4;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
@@ -25,43 +27,20 @@ use crate::image::channels::Joining;
 use crate::lists::classify::channels;
 use crate::part::Content;
 use crate::scene::Scene;
-use crate::settings::splatting::{Classification, check_first_hit};
+use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::Window;
 use crate::stats::Counts;
 use crate::volume::Volume;
 
+pub use buffer::Buffer;
+pub use culled::Culled;
 pub use cut::Cuts;
 pub use geometry::Geometry;
+pub use host::Host;
 pub use means::Means;
-pub use shading::Splat;
-pub use splat::Section;
+pub use section::{Section, Splat};
 pub use visibility::Areas;
-
-/// An f64 image of premultiplied RGBA, with row 0 at the top.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Buffer {
-    /// Pixels per row.
-    pub width: usize,
-    /// The pixels, row by row.
-    pub pixels: Vec<DVec4>,
-}
-
-impl Buffer {
-    /// A buffer of zeros.
-    pub fn new(width: u32, height: u32) -> Self {
-        Self { width: width as usize, pixels: vec![DVec4::ZERO; width as usize * height as usize] }
-    }
-
-    /// Converts the buffer to an f32 image.
-    pub fn into_image(self) -> Image {
-        Image {
-            width: self.width as u32,
-            height: (self.pixels.len() / self.width) as u32,
-            pixels: self.pixels.iter().map(|pixel| pixel.as_vec4().to_array()).collect(),
-        }
-    }
-}
 
 /// Renders the scene's camera, image, shading and splatting settings over a volume, with nothing culled.
 ///
@@ -69,32 +48,6 @@ impl Buffer {
 /// If the scene needs more than can be computed.
 pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
     render_culled(volume, transfer, scene, None).map(|culled| culled.image)
-}
-
-/// What a host adds to a scene.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Host<'a> {
-    /// For every pixel the depth along w of an opaque surface, in `unit`s from the eye (orthographic: from the camera's centre).
-    pub surfaces: Option<&'a [f64]>,
-    /// The opacity whose depth is requested.
-    pub first_hit: Option<f64>,
-}
-
-impl Host<'_> {
-    /// Checks that there is a surface depth for every pixel, and the requested opacity, as [`SceneView`](crate::SceneView) does.
-    fn check(&self, scene: &Scene) -> Result<(), SettingError> {
-        let pixels = scene.image.width as usize * scene.image.height as usize;
-        if let Some(depths) = self.surfaces {
-            if depths.len() != pixels {
-                let found = format!("{} depths", depths.len());
-                return Err(SettingError::new("surfaces", found, format!("{pixels}, one for every pixel")));
-            }
-            if let Some(at) = depths.iter().position(|depth| depth.is_nan()) {
-                return Err(SettingError::new(format!("surfaces[{at}]"), depths[at], "a number, or infinity"));
-            }
-        }
-        self.first_hit.map_or(Ok(()), check_first_hit)
-    }
 }
 
 /// The counts of what [`render`] draws. Voxels composited one by one count as one section each, and have neither sheets nor tiles.
@@ -115,20 +68,6 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
         return after::count(volume, transfer, scene);
     }
     before::count(volume, transfer, scene)
-}
-
-/// An image with early splat elimination, and counts of what was drawn.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Culled {
-    /// The image.
-    pub image: Image,
-    /// Voxel–sheet pairs that passed the test.
-    pub sections: u64,
-    /// The areas they covered.
-    pub areas: Areas,
-    /// For every pixel the depth along w at which the requested opacity is reached, in `unit`s like the depths of surfaces; infinite where it
-    /// is not reached. Within a sheet opacity grows linearly. Empty if none was requested.
-    pub first_hits: Vec<f64>,
 }
 
 /// Renders with early splat elimination by one of the paper's tests, sheet by sheet, and counts what is drawn. Nothing is culled back to

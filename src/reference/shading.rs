@@ -1,8 +1,9 @@
 //! Classification and shading (SPEC §3): the f64 evaluation of `shaders/shade.wgsl`.
 
-use glam::{DVec2, DVec3, DVec4};
+use glam::{DVec3, DVec4};
 
 use super::Geometry;
+pub use super::section::Splat;
 use crate::error::setting::scaled;
 use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
@@ -11,19 +12,6 @@ use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
-
-/// A projected and shaded voxel.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Splat {
-    /// The pixel coordinates.
-    pub center: DVec2,
-    /// [`Geometry::depth`].
-    pub depth: f64,
-    /// `(C·m, m)` divided by λ, times the low-pass amplitude where that is the same for all sections ([`Geometry::scale`]).
-    pub amount: DVec4,
-    /// α, summed over all channels.
-    pub alpha: f64,
-}
 
 /// The indices in memory of the voxels that take part, ascending.
 pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {

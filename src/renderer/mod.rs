@@ -1,6 +1,7 @@
 //! The renderer that a host embeds. It owns pipelines, but no device, and neither submits nor waits. It prepares every frame, which can fail,
 //! records it, and presents it, which fails only for a scissor outside the target.
 
+mod buffers;
 pub(crate) mod pick;
 mod prepare;
 pub(crate) mod prepared_frame;
@@ -31,7 +32,7 @@ use crate::rasterizer::kind::{HAS_TILES, RasterizerKind};
 use crate::rasterizer::quads::QuadRasterizer;
 use crate::rasterizer::samples::SampleRasterizer;
 use crate::rasterizer::tiles::TileRasterizer;
-use crate::renderer::prepare::{
+use crate::renderer::buffers::{
     control_points, cut_uniform, frame_uniform, joined_hits, needs_of, staging, timestamps_at,
 };
 use crate::renderer::prepared_frame::{Drawing, FirstHits, Joined, PreparedFrame, PreparedLayer};

@@ -1,16 +1,17 @@
 //! The preparing of frames: buffers are written, and allocated again where they no longer fit.
 
-use wgpu::{Buffer, BufferUsages, Device, Queue};
+use wgpu::{Buffer, Device, Queue};
 
 use super::Renderer;
+use super::buffers::{
+    control_points, cut_uniform, frame_uniform, frame_values, joined_hits, needs_of, staging, timestamps_at,
+};
 use crate::error::RenderError;
-use crate::gpu::bindings::{BufferSpec, buffer_spec, content_spec, grown, written};
+use crate::gpu::bindings::{BufferSpec, grown, written};
 use crate::gpu::classified_volume::{ClassifiedVolume, Layer};
 use crate::gpu::counts::{self, Staging};
-use crate::gpu::layout::{Cut, Frame};
-use crate::gpu::shown_bricks::BrickNeeds;
 use crate::gpu::targets::{CompositingBuffer, no_surfaces};
-use crate::gpu::timer::{PASS_BYTES, Timer};
+use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
 use crate::image::channels::Joining;
 use crate::pass::composite::CutBuffers;
@@ -258,45 +259,4 @@ impl Renderer {
     fn quads(&self, device: &Device) -> &QuadRasterizer {
         self.quads.get_or_init(|| QuadRasterizer::new(device, self.sheet_format, self.sheets))
     }
-}
-
-/// What decides which bricks a frame draws whose values are classified after splatting.
-pub(super) fn needs_of(request: &FrameRequest) -> Option<&BrickNeeds> {
-    request.after.as_ref().map(|after| &after.needs)
-}
-
-pub(super) fn frame_uniform() -> BufferSpec {
-    content_spec("sheetsplat.frame", size_of::<Frame>() as u64, BufferUsages::UNIFORM)
-}
-
-pub(super) fn cut_uniform() -> BufferSpec {
-    content_spec("sheetsplat.cut", size_of::<Cut>() as u64, BufferUsages::UNIFORM)
-}
-
-pub(super) fn control_points(request: &FrameRequest) -> BufferSpec {
-    let bytes = size_of_val(&request.ramps.points[..]) as u64;
-    content_spec("sheetsplat.control_points", bytes, BufferUsages::STORAGE)
-}
-
-/// The frame's constants for a request.
-fn frame_values(volume: &ClassifiedVolume, request: &FrameRequest, scene: &Scene) -> Frame {
-    let values = (volume.grid(), volume.gpu_volume().value_format());
-    uniforms::frame(request.stage_view(), &request.kernel, values, &request.ramps, scene)
-}
-
-/// The first hits of all layers, one word per pixel, or a single one if they are not asked for.
-pub(super) fn joined_hits(first: &FrameRequest) -> BufferSpec {
-    let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
-    buffer_spec("sheetsplat.joined_hits", first.hit_bytes().max(4), usage)
-}
-
-/// The byte offset of the timestamps behind counts.
-pub(super) fn timestamps_at(count_bytes: u64) -> u64 {
-    count_bytes.next_multiple_of(8)
-}
-
-/// The buffer for counts, followed by the timestamps of `passes` passes if they are timed.
-pub(super) fn staging(timestamps: u64, timed: bool, passes: usize) -> BufferSpec {
-    let bytes = timestamps + if timed { passes as u64 * PASS_BYTES } else { 0 };
-    buffer_spec("sheetsplat.counts", bytes, BufferUsages::COPY_DST | BufferUsages::MAP_READ)
 }

@@ -1,261 +1,47 @@
 //! Scenes: what an image shows and how, from a scene file, from `--set` overrides, or from a volume alone (SPEC §7).
 
 mod channel;
+mod channels;
 mod check;
+mod definition;
+mod error;
+mod image_settings;
 mod level;
 mod load;
 pub(crate) mod names;
 mod open;
 mod overrides;
 mod reader;
+mod source;
 mod tables;
+mod transfer_settings;
 mod writer;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::DVec3;
 use toml::Table;
 
-use crate::appearance::{Colormap, Preset, categories};
-use crate::error::setting::Allowed;
+pub use channel::Channel;
+pub use definition::Scene;
+pub use error::SceneError;
+pub use image_settings::ImageSettings;
+pub use open::OpenVolume;
+pub use source::VolumeSource;
+pub use transfer_settings::TransferSettings;
+
+use crate::appearance::{Preset, categories};
 use crate::lists::extent;
 use crate::settings::camera::{Camera, Fit};
-use crate::settings::clip::Clip;
 use crate::settings::framing::Extent;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
-use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
-use crate::volume::{Access, RawLayout, ReadOptions, Store, Volume, VolumeError};
-pub use channel::Channel;
-pub use open::OpenVolume;
-use overrides::{OVERRIDE, apply_override};
-use reader::{Origins, Section};
-
-/// Why a scene could not be read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SceneError {
-    /// The scene file could not be opened or read.
-    #[error("{}: {source}", path.display())]
-    #[non_exhaustive]
-    Io {
-        /// The scene file.
-        path: PathBuf,
-        /// The operating system's error.
-        source: std::io::Error,
-    },
-    /// The scene file is not TOML.
-    #[error("{origin}: {message}")]
-    #[non_exhaustive]
-    Syntax {
-        /// The scene file.
-        origin: String,
-        /// What is wrong, with line and column.
-        message: String,
-    },
-    /// A key is unknown or missing, or its value has the wrong type or is out of range.
-    #[error("{origin}: {key}: found {found}, allowed: {allowed}")]
-    #[non_exhaustive]
-    Invalid {
-        /// The scene file, or `--set` if the value came from an override.
-        origin: String,
-        /// The full key, with elements counted from 0: `camera.up`, `transfer.opacity[2]`.
-        key: String,
-        /// What was found, as written.
-        found: String,
-        /// What is allowed.
-        allowed: Allowed,
-    },
-}
-
-impl From<VolumeError> for SceneError {
-    fn from(error: VolumeError) -> Self {
-        match error.into_parts() {
-            Ok((path, source)) => Self::Io { path, source },
-            Err([origin, key, found, allowed]) => Self::Invalid { origin, key, found, allowed: allowed.into() },
-        }
-    }
-}
-
-/// The source of a scene's volume.
-#[derive(Clone, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum VolumeSource {
-    /// A volume file.
-    File(PathBuf),
-    /// A file of samples without a header.
-    Raw(PathBuf, RawLayout),
-    /// A procedural volume, `NAME` or `NAME:N` (see [`builtin::volume`](crate::volume::builtin::volume)).
-    Builtin(String),
-    /// A volume that the program holds in memory and passes to the renderer. A scene file cannot name it.
-    Memory,
-}
-
-impl VolumeSource {
-    /// The path of a volume file, with or without a header; `None` for any other volume.
-    pub fn path(&self) -> Option<&Path> {
-        match self {
-            Self::File(path) | Self::Raw(path, _) => Some(path),
-            Self::Builtin(_) | Self::Memory => None,
-        }
-    }
-}
-
-/// The image's size and background.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ImageSettings {
-    /// Pixels per row, at least 1. The renderer checks the device's texture limit.
-    pub width: u32,
-    /// The number of rows, at least 1. The renderer checks the device's texture limit.
-    pub height: u32,
-    /// Straight-alpha, display-referred RGBA in [0, 1].
-    pub background: [f64; 4],
-}
-
-impl Default for ImageSettings {
-    fn default() -> Self {
-        Self { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] }
-    }
-}
-
-/// The transfer function as far as a scene states it; the rest is chosen once the volume is known.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct TransferSettings {
-    /// The preset that chooses the rest; `None` means [`TransferFunction::from_histogram`].
-    pub preset: Option<Preset>,
-    /// The colour map over the visible values, used if `color` is `None`.
-    pub colormap: Option<Colormap>,
-    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the volume.
-    pub color: Option<Ramp<DVec3>>,
-    /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen from the volume.
-    pub opacity: Option<Ramp<f64>>,
-    /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` means 1 everywhere.
-    pub gradient_opacity: Option<Ramp<f64>>,
-    /// Closed intervals `[lo, hi]` of the values that take part; `None` means all values.
-    pub iso_ranges: Option<Vec<[f64; 2]>>,
-    /// Tables for single labels of a segmented volume; empty for other volumes.
-    pub labels: BTreeMap<u16, LabelTables>,
-}
-
-impl From<TransferFunction> for TransferSettings {
-    /// Settings that state everything about one channel; further ones are ignored.
-    fn from(transfer: TransferFunction) -> Self {
-        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, further: _ } = transfer;
-        let (color, opacity) = (Some(color), Some(opacity));
-        Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
-    }
-}
-
-impl TransferSettings {
-    /// The complete transfer function for a volume. Colours and opacities that are not stated (for labels, too) come from the preset or
-    /// from [`TransferFunction::from_histogram`], independently of each other. A colour map covers the visible values ([`Colormap::of`]).
-    pub fn resolve(&self, volume: &Volume) -> TransferFunction {
-        self.resolve_by(volume, |preset| match preset {
-            Some(preset) => preset.transfer(volume),
-            None => TransferFunction::from_histogram(volume),
-        })
-    }
-
-    /// [`Self::resolve`] with what a preset, or none, chooses.
-    fn resolve_by(&self, volume: &Volume, of: impl Fn(Option<Preset>) -> TransferFunction) -> TransferFunction {
-        let chosen = || of(self.preset);
-        let mut transfer = match (&self.color, &self.opacity) {
-            (Some(color), Some(opacity)) if self.preset.is_none() => {
-                TransferFunction::by_value(color.clone(), opacity.clone())
-            }
-            _ => chosen(),
-        };
-        if let Some(opacity) = &self.opacity {
-            transfer.opacity = opacity.clone();
-        }
-        // Presets have no gradient opacity.
-        transfer.gradient_opacity = self.gradient_opacity.clone();
-        transfer.iso_ranges = self.iso_ranges.clone();
-        for (&label, own) in &self.labels {
-            let LabelTables { color, opacity, gradient_opacity, .. } =
-                transfer.labels.remove(&label).unwrap_or_default();
-            let tables = LabelTables {
-                visible: own.visible,
-                color: own.color.clone().or(color),
-                opacity: own.opacity.clone().or(opacity),
-                gradient_opacity: own.gradient_opacity.clone().or(gradient_opacity),
-            };
-            transfer.labels.insert(label, tables);
-        }
-        match (&self.color, self.colormap) {
-            (Some(color), _) => transfer.color = color.clone(),
-            (None, Some(map)) => transfer.color = map.of(volume, &transfer).unwrap_or(transfer.color),
-            (None, None) => {}
-        }
-        transfer
-    }
-}
-
-/// Everything that determines an image, except the device that computes it.
-///
-/// The readers below accept `--set` overrides, each `table.key=value` (or `table={…}` for a whole table), applied in order over the
-/// file's values. The value is TOML, or a string if it does not parse as TOML. An override of `volume.path` also removes
-/// `volume.builtin`; one of `volume.builtin` removes `volume.path` and the layout of a raw file. Where a scene file has tables `[[channel]]`, keys of `volume`
-/// are those of the first channel, and `volume.time`, `level` and `spacing` also those of all channels that name its file. `volume.index` leaves one
-/// of these tables if the others name no volume: that of the channel with this number.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Scene {
-    /// The source of the volume. This, and all up to `transfer`, are those of the first channel.
-    pub volume: VolumeSource,
-    /// World units between neighbouring voxels, each above 0, in place of the volume's own spacing.
-    pub spacing: Option<DVec3>,
-    /// A file with one label per voxel, in place of the volume's own labels.
-    pub labels: Option<PathBuf>,
-    /// The number, from 0, of the only channel that is read of a file with several; `None` reads all.
-    pub index: Option<u32>,
-    /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
-    pub time: Option<u32>,
-    /// The level, from 0 for the finest, that is read of a store with several; `None` chooses one ([`Self::choose_levels`]).
-    pub level: Option<u32>,
-    /// The name of the channel in legends and picks; `None` uses the file's.
-    pub name: Option<String>,
-    /// Whether the channel is drawn.
-    pub visible: bool,
-    /// The camera.
-    pub camera: Camera,
-    /// The image's size and background.
-    pub image: ImageSettings,
-    /// What is cut away.
-    pub clip: Clip,
-    /// Colour and opacity.
-    pub transfer: TransferSettings,
-    /// The channels after the first (SPEC §10), all on its grid.
-    pub further: Vec<Channel>,
-    /// Light and material.
-    pub shading: Shading,
-    /// Kernel, slabs, compositing, culling.
-    pub splatting: Splatting,
-}
+use crate::settings::transfer_function::TransferFunction;
+use crate::volume::{Access, ReadOptions, Store, Volume, VolumeError};
+use overrides::apply_override;
+use reader::{OVERRIDE, Origins, Section};
 
 impl Scene {
-    /// A scene of a volume with every setting at its default.
-    pub fn new(volume: VolumeSource) -> Self {
-        Self {
-            volume,
-            spacing: None,
-            labels: None,
-            index: None,
-            time: None,
-            level: None,
-            name: None,
-            visible: true,
-            camera: Camera { fit: Fit::Object, ..Camera::default() },
-            image: ImageSettings::default(),
-            clip: Clip::default(),
-            transfer: TransferSettings::default(),
-            further: Vec::new(),
-            shading: Shading::default(),
-            splatting: Splatting { classification: Classification::Auto, ..Splatting::default() },
-        }
-    }
-
     /// Reads a scene file and applies `--set` overrides. A relative `volume.path` or `volume.labels`, overridden or not, is relative
     /// to the scene file's folder.
     ///

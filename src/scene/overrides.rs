@@ -3,10 +3,7 @@
 use toml::{Table, Value};
 
 use super::SceneError;
-use super::reader::typed;
-
-/// The origin of values set on the command line.
-pub(super) const OVERRIDE: &str = "--set";
+use super::reader::{OVERRIDE, typed};
 
 /// The maximum number of channels.
 pub(super) const MAX_CHANNELS: usize = 64;

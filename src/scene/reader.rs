@@ -5,12 +5,14 @@ use std::ops::{Add, Mul};
 use glam::UVec3;
 use toml::{Table, Value};
 
-use super::overrides::OVERRIDE;
 use super::{ImageSettings, SceneError};
 use crate::error::setting::{Allowed, Found, Interval, SettingError};
 use crate::settings::economies::KEYS;
 use crate::settings::transfer_function::{Ramp, RampError};
 use crate::volume::{SIZES, dims_of};
+
+/// The origin of values set on the command line.
+pub(super) const OVERRIDE: &str = "--set";
 
 /// The origin of each key's value.
 pub(super) struct Origins<'a> {

@@ -11,25 +11,8 @@ use circles::Files;
 /// The folders of crates, without `bin`, and the circles of files in each: a file of the circle, and the number of its files. Circles make it hard to read
 /// one file without the others, so they may only shrink.
 const CIRCLES: [(&str, &[(&str, usize)]); 3] = [
-    (
-        "src",
-        &[
-            ("appearance", 4),
-            ("cpu", 24),
-            ("golden/bless", 2),
-            ("golden/file", 2),
-            ("gpu/coefficients", 2),
-            ("headless", 13),
-            ("image", 4),
-            ("part", 3),
-            ("part/exr", 3),
-            ("pass/clear", 2),
-            ("reference", 18),
-            ("renderer", 2),
-            ("scene", 7),
-        ],
-    ),
-    ("src/bin/sheetsplat", &[("adapters", 18), ("annotate", 4)]),
+    ("src", &[("cpu", 22), ("headless", 5)]),
+    ("src/bin/sheetsplat", &[]),
     ("crates/volume/src", &[("zarr/blosc", 2)]),
 ];
 
@@ -90,7 +73,7 @@ fn no_modules_import_each_other_in_a_cycle() {
 
 #[test]
 fn circles_of_files_do_not_grow() {
-    let mut wrong = String::new();
+    let mut wrong = Vec::new();
     for (folder, known) in CIRCLES {
         let files = Files::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder));
         assert!(files.count() > 40, "only {} files in {folder}", files.count());
@@ -98,24 +81,19 @@ fn circles_of_files_do_not_grow() {
         for circle in &circles {
             let row = known.iter().find(|(name, _)| circle.contains_key(*name));
             let (name, allowed) = row.copied().unwrap_or((circle.keys().next().unwrap(), 0));
-            match circle.len() {
-                count if count > allowed => {
-                    wrong += &format!(
-                        "{folder}: {count} files import one another, {name} among them; {allowed} did before. Move what they share to a file of its own: \
-                     {circle:#?}\n"
-                    )
-                }
-                count if count < allowed => {
-                    wrong += &format!("{folder}: the circle of {name} has {count} files; write {count}\n")
-                }
-                _ => {}
+            let count = circle.len();
+            if count > allowed {
+                let found = format!("the circle of {name} has {count} files, allowed: {allowed}");
+                wrong.push(format!("{folder}: {found}; give what they share a file of its own: {circle:#?}"));
+            } else if count < allowed {
+                wrong.push(format!("{folder}: the circle of {name} has shrunk: write {count}"));
             }
         }
         for (name, _) in known.iter().filter(|(name, _)| !circles.iter().any(|circle| circle.contains_key(*name))) {
-            wrong += &format!("{folder}: {name} is in no circle; remove its row\n");
+            wrong.push(format!("{folder}: {name} is in no circle any more: remove its row"));
         }
     }
-    assert!(wrong.is_empty(), "{wrong}");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 #[test]
@@ -182,6 +160,6 @@ fn functions_of_numbers_are_those_of_libm() {
     for folder in ["src", "crates/volume/src"] {
         scan(root, &root.join(folder), &mut lines, &mut found);
     }
-    assert!(lines > 35_000, "only {lines} lines");
+    assert!(lines > 45_000, "only {lines} lines");
     assert!(found.is_empty(), "{found:#?}");
 }

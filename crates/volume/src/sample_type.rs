@@ -85,7 +85,7 @@ impl SampleType {
     pub(super) fn full(self) -> f64 {
         match self {
             Self::F32 | Self::F64 => 1.0,
-            _ => for_sample_type!(self, Number => Number::MAX as f64),
+            _ => for_sample_type!(self, Number => Number::MAX.to_f64()),
         }
     }
 

@@ -6,7 +6,7 @@ use sheetsplat::DeviceRequirements;
 use sheetsplat::headless::device;
 
 use crate::failure::Failure;
-use crate::stdout;
+use crate::stdout::stdout;
 
 #[derive(clap::Args)]
 #[command(after_help = "Examples:\n  sheetsplat adapters\n  sheetsplat adapters --adapter llvmpipe")]

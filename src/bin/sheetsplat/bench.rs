@@ -11,7 +11,7 @@ use crate::arguments::{Input, parse_degrees};
 use crate::failure::Failure;
 use crate::memory::peak_rss_mib;
 use crate::outputs::Outputs;
-use crate::stdout;
+use crate::stdout::stdout;
 
 #[derive(clap::Args)]
 #[command(after_help = "Example:\n  sheetsplat bench builtin:head --frames 20 --rotate 3")]

@@ -4,7 +4,7 @@ use clap::Command;
 use clap_complete::Shell;
 
 use crate::failure::Failure;
-use crate::stdout;
+use crate::stdout::stdout;
 
 #[derive(clap::Args)]
 #[command(

@@ -20,6 +20,7 @@ mod parts;
 mod progress;
 mod reading;
 mod render;
+mod stdout;
 mod sweep;
 #[cfg(feature = "viewer")]
 mod view;
@@ -120,11 +121,4 @@ fn main() -> ExitCode {
         Failure::Input(_) => ExitCode::from(2),
         Failure::Other(_) => ExitCode::FAILURE,
     }
-}
-
-/// Writes a result to standard output.
-fn stdout(bytes: &[u8]) -> Result<(), Failure> {
-    let mut stdout = std::io::stdout().lock();
-    let written = stdout.write_all(bytes).and_then(|()| stdout.flush());
-    written.map_err(|error| Failure::Other(format!("standard output: {error}")))
 }

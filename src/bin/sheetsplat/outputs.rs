@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use sheetsplat::image::output::{Output, Target, folder, resolved};
 
 use crate::failure::Failure;
-use crate::stdout;
+use crate::stdout::stdout;
 
 /// A file to be written: the option that names it, and its path.
 pub(crate) type Named<'a> = (&'static str, &'a Path);

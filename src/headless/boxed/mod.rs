@@ -20,7 +20,8 @@ use std::ops::Range;
 
 use web_time::Instant;
 
-use super::{Headless, joined, milliseconds_since};
+use super::timed::milliseconds_since;
+use super::{Headless, joined};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;

@@ -16,22 +16,21 @@
 //! own ray, and rounding is the only approximation.
 
 pub mod coefficients;
+mod composite;
 mod counts;
 mod extreme;
 pub mod field;
+mod frame;
 pub mod low_pass;
 pub mod pixel;
 pub mod slab_integral;
 mod surface;
 
-use std::ops::Range;
+use glam::UVec2;
 
-use glam::{DVec3, UVec2};
-
-use super::{Areas, Buffer, Culled, Geometry, Host, resolve};
+use super::{Areas, Buffer, Culled, Host, resolve};
 use crate::error::RenderError;
 use crate::image::channels::Joining;
-use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::part::{Content, Extreme};
 use crate::scene::Scene;
@@ -42,100 +41,10 @@ use crate::volume::Volume;
 
 pub use counts::count;
 pub use field::Field;
-use low_pass::LowPass;
+pub use frame::Frame;
 pub use pixel::{Composited, Pixel, Sample, Slab};
 
-/// One channel of a scene, ready to be drawn.
-#[derive(Debug)]
-pub struct Frame<'a> {
-    volume: &'a Volume,
-    transfer: &'a TransferFunction,
-    scene: Scene,
-    host: Host<'a>,
-    /// The slabs that are drawn.
-    slabs: Range<i32>,
-    geometry: Geometry,
-    field: Field<'a>,
-}
-
-impl<'a> Frame<'a> {
-    /// The first channel's.
-    ///
-    /// # Errors
-    /// If the scene needs more than can be computed.
-    pub fn new(
-        host: Host<'a>,
-        volume: &'a Volume,
-        transfer: &'a TransferFunction,
-        scene: &Scene,
-    ) -> Result<Self, RenderError> {
-        scene.check()?;
-        transfer.check()?;
-        host.check(scene)?;
-        Self::of_channel(host, volume, transfer, scene.framed(volume, transfer))
-    }
-
-    /// Those of all channels, which share everything that depends on the view.
-    ///
-    /// # Errors
-    /// If the scene needs more than can be computed.
-    pub fn of_channels(
-        host: Host<'a>,
-        volume: &'a Volume,
-        transfer: &'a TransferFunction,
-        scene: &Scene,
-    ) -> Result<Vec<Self>, RenderError> {
-        let first = Self::new(host, volume, transfer, scene)?;
-        let scene = first.scene.clone();
-        let further = channels(volume, transfer).skip(1);
-        let further = further.map(|(volume, transfer)| Self::of_channel(host, volume, transfer, scene.clone()));
-        std::iter::once(Ok(first)).chain(further).collect()
-    }
-
-    fn of_channel(
-        host: Host<'a>,
-        volume: &'a Volume,
-        transfer: &'a TransferFunction,
-        scene: Scene,
-    ) -> Result<Self, RenderError> {
-        let geometry = Geometry::new(volume.grid(), &scene)?;
-        let field = Field::new(volume, &scene)?;
-        Ok(Self { volume, transfer, scene, host, slabs: Window::ALL_SLABS, geometry, field })
-    }
-
-    /// The view's geometry.
-    pub fn geometry(&self) -> &Geometry {
-        &self.geometry
-    }
-
-    /// The field.
-    pub fn field(&self) -> &Field<'a> {
-        &self.field
-    }
-
-    /// The low-pass rule on a plane; `None` at the eye and behind it.
-    pub fn low_pass(&self, plane: i32) -> Option<LowPass> {
-        self.low_pass_at(f64::from(plane) * self.geometry.slab_width)
-    }
-
-    /// The low-pass rule at a sheet depth; `None` at the eye and behind it.
-    fn low_pass_at(&self, depth: f64) -> Option<LowPass> {
-        let geometry = &self.geometry;
-        let aspect = geometry.grid.aspect();
-        let (right, down) = (geometry.basis.u / aspect, -geometry.basis.v / aspect);
-        match &geometry.eye {
-            None => {
-                let in_plane = |step: DVec3| (step - step.dot(geometry.ro) * geometry.ro) * geometry.pix;
-                Some(LowPass::new(in_plane(right), in_plane(down)))
-            }
-            // Planes are parallel to the image, and therefore to the steps from pixel to pixel.
-            Some(eye) => {
-                let pix = eye.pix(depth);
-                (depth > 0.0).then(|| LowPass::new(right * pix, down * pix))
-            }
-        }
-    }
-
+impl Frame<'_> {
     /// The pixel at a position counted from the upper left.
     pub fn pixel(&self, pixel: UVec2) -> Pixel<'_> {
         Pixel::new(self, pixel)
@@ -164,7 +73,7 @@ impl<'a> Frame<'a> {
 
 /// The pixels of a region composited from all channels, row by row.
 fn composite(frames: &[Frame], region: &Region) -> Vec<Composited> {
-    let pixel = |at: UVec2| pixel::composite(&frames.iter().map(|frame| frame.pixel(at)).collect::<Vec<_>>());
+    let pixel = |at: UVec2| composite::composite(&frames.iter().map(|frame| frame.pixel(at)).collect::<Vec<_>>());
     each_place_in(region, pixel)
 }
 

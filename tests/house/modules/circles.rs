@@ -26,11 +26,11 @@ struct File {
 }
 
 /// The files of a crate by their modules.
-pub struct Files(BTreeMap<Module, File>);
+pub(super) struct Files(BTreeMap<Module, File>);
 
 impl Files {
     /// Reads the files in a folder with a crate's root, without those in `bin`.
-    pub fn read(root: &Path) -> Self {
+    pub(super) fn read(root: &Path) -> Self {
         fn collect(folder: &Path, module: &[String], found: &mut BTreeMap<Module, File>) {
             for entry in fs::read_dir(folder).unwrap() {
                 let path = entry.unwrap().path();
@@ -51,17 +51,17 @@ impl Files {
     }
 
     /// Files of these names and texts.
-    pub fn of_texts(texts: &[(&str, &str)]) -> Self {
+    pub(super) fn of_texts(texts: &[(&str, &str)]) -> Self {
         let module = |name: &str| name.split('/').filter(|word| *word != "lib").map(str::to_owned).collect();
         Self(texts.iter().map(|(name, text)| (module(name), File::parse(text))).collect())
     }
 
-    pub fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.0.len()
     }
 
     /// The circles of at least two files, each with the files of the circle that a file imports from.
-    pub fn circles(&self) -> Vec<BTreeMap<String, BTreeSet<String>>> {
+    pub(super) fn circles(&self) -> Vec<BTreeMap<String, BTreeSet<String>>> {
         let edges: BTreeMap<&Module, BTreeSet<Module>> = self.0.keys().map(|from| (from, self.used(from))).collect();
         let reached: BTreeMap<&Module, BTreeSet<&Module>> =
             edges.keys().map(|from| (*from, reached(&edges, from))).collect();
@@ -141,7 +141,7 @@ fn reached<'a>(edges: &'a BTreeMap<&Module, BTreeSet<Module>>, from: &Module) ->
 impl File {
     fn parse(text: &str) -> Self {
         let is_test = |line: &str| line == "#[cfg(test)]" || line.starts_with("#[cfg(all(test");
-        let mut lines = text.lines().take_while(|line| !is_test(line)).map(without_comment);
+        let mut lines = text.lines().take_while(|line| !is_test(line)).map(code_of);
         let (mut imports, mut macros, mut others, mut inline_end) = (Vec::new(), Vec::new(), String::new(), None);
         while let Some(line) = lines.next() {
             let indent = &line[..line.len() - line.trim_start().len()];
@@ -172,8 +172,15 @@ impl File {
     }
 }
 
-fn without_comment(line: &str) -> String {
-    line.split("//").next().unwrap_or_default().trim_end().to_owned()
+/// A line without its comment and paths of visibility.
+fn code_of(line: &str) -> String {
+    let code = line.split("//").next().unwrap_or_default().trim_end();
+    let Some((before, (_, after))) =
+        code.split_once("pub(in ").map(|(before, rest)| (before, rest.split_once(')').unwrap_or_default()))
+    else {
+        return code.to_owned();
+    };
+    format!("{before}pub{after}")
 }
 
 fn without_visibility(statement: &str) -> &str {

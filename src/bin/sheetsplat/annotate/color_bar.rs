@@ -9,8 +9,8 @@ use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
 use super::legend::shortened;
+use super::plate::{PADDING, plate_for};
 use super::round::ticks;
-use super::{PADDING, plate_for};
 use crate::canvas::{LINE, filled, lay, rule, text_width, write};
 use crate::failure::Failure;
 

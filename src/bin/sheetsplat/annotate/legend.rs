@@ -6,7 +6,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
-use super::{PADDING, plate_for};
+use super::plate::{PADDING, plate_for};
 use crate::canvas::{LINE, filled, lay, text_width, write};
 use crate::failure::Failure;
 

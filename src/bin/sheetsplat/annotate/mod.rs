@@ -2,6 +2,7 @@
 
 mod color_bar;
 mod legend;
+mod plate;
 mod round;
 mod scale_bar;
 
@@ -13,17 +14,11 @@ use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 use sheetsplat::volume::Volume;
 
-use crate::canvas::{filled, lay};
+use crate::canvas::lay;
 use crate::failure::Failure;
 
 /// Pixels between plates, and between plates and the image's edges.
 const MARGIN: u32 = 8;
-
-/// Pixels between a plate's edges and its content.
-const PADDING: u32 = 6;
-
-/// A premultiplied background on which text is readable over any image.
-const PLATE: [f32; 4] = [0.0, 0.0, 0.0, 0.75];
 
 /// The choice of annotations.
 #[derive(clap::Args)]
@@ -115,9 +110,4 @@ impl Overlay {
             lay(image, *corner, plate);
         }
     }
-}
-
-/// An empty plate around content of a size.
-fn plate_for([width, height]: [u32; 2]) -> Image {
-    filled([width.saturating_add(2 * PADDING), height.saturating_add(2 * PADDING)], PLATE)
 }

@@ -4,8 +4,8 @@ use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 use sheetsplat::volume::Volume;
 
+use super::plate::{PADDING, plate_for};
 use super::round::{round_down, written};
-use super::{PADDING, plate_for};
 use crate::canvas::{LINE, rule, text_width, write};
 use crate::failure::Failure;
 

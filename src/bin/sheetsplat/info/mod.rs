@@ -14,7 +14,7 @@ use sheetsplat::volume::{Orientation, SampleType, StreamedVolume, Volume};
 use crate::arguments::Input;
 use crate::failure::Failure;
 use crate::outputs::Outputs;
-use crate::stdout;
+use crate::stdout::stdout;
 use statistics::{Histogram, extent_and_mean};
 
 #[derive(clap::Args)]

@@ -7,7 +7,7 @@ use sheetsplat::settings::Window;
 use crate::arguments::Input;
 use crate::failure::Failure;
 use crate::outputs::Outputs;
-use crate::stdout;
+use crate::stdout::stdout;
 
 #[derive(clap::Args)]
 #[command(after_help = "\

@@ -16,12 +16,13 @@ use sheetsplat::scene::{ImageSettings, Scene};
 use sheetsplat::settings::{Camera, Extent, TransferFunction, navigation};
 use sheetsplat::volume::Volume;
 
+use super::arguments::{Arguments, Outcome};
 use super::channels::{Change, Channels};
 use super::editor::Editor;
 use super::guest::Guest;
 use super::histogram::{Histogram, extent};
 use super::pace::Pace;
-use super::{Outcome, panel, plot, screenshot};
+use super::{panel, plot, screenshot};
 use crate::failure::Failure;
 
 /// Degrees that the camera turns for a drag over the picture's whole height.
@@ -73,7 +74,7 @@ struct Capture {
 impl App {
     pub(super) fn new(
         context: &eframe::CreationContext<'_>,
-        arguments: &super::Arguments,
+        arguments: &Arguments,
         mut scene: Scene,
         volume: Volume,
         outcome: Outcome,

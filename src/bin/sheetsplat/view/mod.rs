@@ -1,6 +1,7 @@
 //! `sheetsplat view`: a window with the picture and its settings.
 
 mod app;
+mod arguments;
 mod channels;
 mod editor;
 mod guest;
@@ -10,46 +11,17 @@ mod panel;
 mod plot;
 mod screenshot;
 
-use std::cell::RefCell;
-use std::path::PathBuf;
-use std::rc::Rc;
-
 use eframe::NativeOptions;
 use eframe::egui::{IconData, ViewportBuilder};
 use sheetsplat::headless::Backend;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
 
-use crate::arguments::Input;
 use crate::failure::Failure;
 use crate::outputs::Outputs;
 use app::App;
-
-#[derive(clap::Args)]
-#[command(after_help = "\
-Examples:
-  sheetsplat view builtin:head
-  sheetsplat view scene.toml --size 1600x1000")]
-pub(crate) struct Arguments {
-    #[command(flatten)]
-    input: Input,
-    /// Size of the window in points (pixels, unless the display is scaled).
-    #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
-    size: [u16; 2],
-    /// Save the window's first complete frame and close the window: .png, .exr or .npy.
-    #[arg(long, value_name = "FILE")]
-    screenshot: Option<PathBuf>,
-}
-
-/// The result, unless the user closed the window.
-type Outcome = Rc<RefCell<Option<Result<(), Failure>>>>;
-
-/// Parses `WxH`.
-fn parse_size(text: &str) -> Result<[u16; 2], String> {
-    let parse = |side: &str| side.parse::<u16>().ok().filter(|side| (100..=16384).contains(side));
-    let sides = text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]));
-    sides.ok_or_else(|| "allowed: WxH, each 100 to 16384".to_owned())
-}
+pub(crate) use arguments::Arguments;
+use arguments::Outcome;
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.screenshot {

@@ -1,0 +1,120 @@
+//! A part of an image, and what identifies the image.
+
+use std::ops::Range;
+
+use glam::UVec3;
+
+use super::check::adds_up;
+use super::content::{Content, Rule};
+use super::fingerprint;
+use super::mean::{MeanTables, note_labels};
+use crate::error::RenderError;
+use crate::error::setting::SettingError;
+use crate::geometry::view_geometry::ViewGeometry;
+use crate::scene::{OpenVolume, Scene};
+use crate::settings::splatting::{Classification, Compositing, Order};
+use crate::settings::window::Window;
+
+/// A part of an image: f32 pixels without the background, and what identifies them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// A name for errors: the file, or what the part shows.
+    pub name: String,
+    /// The image that it is a part of.
+    pub identity: Identity,
+    /// The slabs and pixels that it shows.
+    pub window: Window,
+    /// Its pixels.
+    pub content: Content,
+    /// Where channels share no sheets (SPEC §10) and their images are added up, the pixels of the channels after the first; otherwise empty.
+    pub further: Vec<Content>,
+}
+
+/// What the parts of one image have in common.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identity {
+    /// A hash of everything that bears on the image, in hexadecimal digits: the volume's values, or if it is streamed, what identifies the store's; not paths,
+    /// nor what draws.
+    pub fingerprint: String,
+    /// Width and height of the whole image.
+    pub size: [u32; 2],
+    /// The scene's slabs, from the first to the last that a kernel may reach.
+    pub slabs: Range<i32>,
+    /// How sheets are composited.
+    pub compositing: Compositing,
+    /// Where voxels, or pixels, are classified.
+    pub classification: Classification,
+    /// The order in which sheets are composited.
+    pub order: Order,
+    /// Straight-alpha RGBA.
+    pub background: [f64; 4],
+    /// The number of images that are added up: that of the channels where these share no sheets, else 1.
+    pub images: usize,
+    /// For `average` classified after splatting, what classifies the means in each of these.
+    pub means: Vec<MeanTables>,
+}
+
+impl Part {
+    /// A part that a backend has drawn.
+    pub(crate) fn new(
+        (volume, scene): (&OpenVolume, &Scene),
+        view: &ViewGeometry,
+        window: &Window,
+        mut content: Content,
+    ) -> Result<Self, RenderError> {
+        let identity = Identity::of((volume, scene), view)?;
+        if let (true, OpenVolume::Whole(volume)) = (identity.notes_labels(), volume) {
+            let grid = volume.grid();
+            let label = |voxel: &UVec3| volume.label(grid.index_of(*voxel)).unwrap_or_default();
+            let labels_at = |voxels: &[UVec3]| Ok::<_, RenderError>(voxels.iter().map(label).collect());
+            note_labels((view, scene, grid), &window.region, &mut content, labels_at)?;
+        }
+        Ok(Self::named(identity, window.clone(), vec![content]))
+    }
+
+    /// A part with its slabs and pixels as its name.
+    pub(crate) fn named(identity: Identity, window: Window, contents: Vec<Content>) -> Self {
+        let Window { slabs: Range { start, end }, region } = &window;
+        let name = format!("slabs {start}..{end} of region {region}");
+        let mut contents = contents.into_iter();
+        let (content, further) = (contents.next().unwrap_or_default(), contents.collect());
+        Self { name, identity, window, content, further }
+    }
+
+    /// The pixels of all images that are added up.
+    pub(crate) fn contents(&self) -> impl Iterator<Item = &Content> {
+        std::iter::once(&self.content).chain(&self.further)
+    }
+}
+
+impl Identity {
+    /// What the parts of a scene of a volume have in common.
+    pub(crate) fn of((volume, scene): (&OpenVolume, &Scene), view: &ViewGeometry) -> Result<Self, RenderError> {
+        let refused = |error: crate::scene::SceneError| SettingError::new("scene", error.to_string(), "another scene");
+        Ok(Self {
+            fingerprint: fingerprint::fingerprint(volume, scene).map_err(refused)?,
+            size: view.size,
+            slabs: view.slabs_of(volume.grid()),
+            compositing: scene.splatting.compositing,
+            classification: scene.classification(volume.sample()),
+            order: scene.splatting.order,
+            background: scene.image.background,
+            images: if adds_up(volume.sample(), scene) { volume.sample().channels().count() } else { 1 },
+            means: MeanTables::of(volume.sample(), scene),
+        })
+    }
+
+    /// Whether pixels carry extremes.
+    pub(crate) fn has_extremes(&self) -> bool {
+        self.rule().has_extremes()
+    }
+
+    /// Whether pixels note labels, whose tables classify means.
+    pub(crate) fn notes_labels(&self) -> bool {
+        self.means.iter().any(MeanTables::has_labels)
+    }
+
+    pub(super) fn rule(&self) -> Rule {
+        Rule { compositing: self.compositing, classification: self.classification }
+    }
+}

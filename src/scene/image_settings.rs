@@ -1,0 +1,18 @@
+//! The settings of the image.
+
+/// The image's size and background.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImageSettings {
+    /// Pixels per row, at least 1. The renderer checks the device's texture limit.
+    pub width: u32,
+    /// The number of rows, at least 1. The renderer checks the device's texture limit.
+    pub height: u32,
+    /// Straight-alpha, display-referred RGBA in [0, 1].
+    pub background: [f64; 4],
+}
+
+impl Default for ImageSettings {
+    fn default() -> Self {
+        Self { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] }
+    }
+}

@@ -1,0 +1,86 @@
+//! The transfer function as far as a scene states it, and how it is completed.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+
+use crate::appearance::{Colormap, Preset};
+use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
+use crate::volume::Volume;
+
+/// The transfer function as far as a scene states it; the rest is chosen once the volume is known.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TransferSettings {
+    /// The preset that chooses the rest; `None` means [`TransferFunction::from_histogram`].
+    pub preset: Option<Preset>,
+    /// The colour map over the visible values, used if `color` is `None`.
+    pub colormap: Option<Colormap>,
+    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the volume.
+    pub color: Option<Ramp<DVec3>>,
+    /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen from the volume.
+    pub opacity: Option<Ramp<f64>>,
+    /// A factor in [0, 1] over gradient magnitudes (value per world unit); `None` means 1 everywhere.
+    pub gradient_opacity: Option<Ramp<f64>>,
+    /// Closed intervals `[lo, hi]` of the values that take part; `None` means all values.
+    pub iso_ranges: Option<Vec<[f64; 2]>>,
+    /// Tables for single labels of a segmented volume; empty for other volumes.
+    pub labels: BTreeMap<u16, LabelTables>,
+}
+
+impl From<TransferFunction> for TransferSettings {
+    /// Settings that state everything about one channel; further ones are ignored.
+    fn from(transfer: TransferFunction) -> Self {
+        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, further: _ } = transfer;
+        let (color, opacity) = (Some(color), Some(opacity));
+        Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
+    }
+}
+
+impl TransferSettings {
+    /// The complete transfer function for a volume. Colours and opacities that are not stated (for labels, too) come from the preset or
+    /// from [`TransferFunction::from_histogram`], independently of each other. A colour map covers the visible values ([`Colormap::of`]).
+    pub fn resolve(&self, volume: &Volume) -> TransferFunction {
+        self.resolve_by(volume, |preset| match preset {
+            Some(preset) => preset.transfer(volume),
+            None => TransferFunction::from_histogram(volume),
+        })
+    }
+
+    /// [`Self::resolve`] with what a preset, or none, chooses.
+    pub(super) fn resolve_by(
+        &self,
+        volume: &Volume,
+        of: impl Fn(Option<Preset>) -> TransferFunction,
+    ) -> TransferFunction {
+        let chosen = || of(self.preset);
+        let mut transfer = match (&self.color, &self.opacity) {
+            (Some(color), Some(opacity)) if self.preset.is_none() => {
+                TransferFunction::by_value(color.clone(), opacity.clone())
+            }
+            _ => chosen(),
+        };
+        if let Some(opacity) = &self.opacity {
+            transfer.opacity = opacity.clone();
+        }
+        // Presets have no gradient opacity.
+        transfer.gradient_opacity = self.gradient_opacity.clone();
+        transfer.iso_ranges = self.iso_ranges.clone();
+        for (&label, own) in &self.labels {
+            let LabelTables { color, opacity, gradient_opacity, .. } =
+                transfer.labels.remove(&label).unwrap_or_default();
+            let tables = LabelTables {
+                visible: own.visible,
+                color: own.color.clone().or(color),
+                opacity: own.opacity.clone().or(opacity),
+                gradient_opacity: own.gradient_opacity.clone().or(gradient_opacity),
+            };
+            transfer.labels.insert(label, tables);
+        }
+        match (&self.color, self.colormap) {
+            (Some(color), _) => transfer.color = color.clone(),
+            (None, Some(map)) => transfer.color = map.of(volume, &transfer).unwrap_or(transfer.color),
+            (None, None) => {}
+        }
+        transfer
+    }
+}
