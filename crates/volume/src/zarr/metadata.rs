@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use serde_json::Value;
 
 use super::super::VolumeError;
-use super::super::source::invalid;
+use super::super::error::volume::invalid;
 use super::codec::{Codec, Codecs};
 use super::json::{self, Json};
 use super::keys::Keys;

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::super::samples::SampleType;
+use super::super::sample_type::SampleType;
 use super::half;
 
 /// A type of numbers.
