@@ -13,7 +13,7 @@ use circles::Files;
 const CIRCLES: [(&str, &[(&str, usize)]); 3] = [
     ("src", &[("cpu", 22), ("headless", 5)]),
     ("src/bin/sheetsplat", &[]),
-    ("crates/volume/src", &[("zarr/blosc", 2)]),
+    ("crates/volume/src", &[("zarr/codec", 2)]),
 ];
 
 /// The modules of the library at its top level, each with those that its code names; tests at the end of a file do not count.

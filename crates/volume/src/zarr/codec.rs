@@ -6,8 +6,8 @@
 use std::borrow::Cow;
 
 use super::super::VolumeError;
+use super::extension::Extension;
 use super::json::Json;
-use super::metadata::Extension;
 use super::shards::Layout;
 use super::steps::{Step, compressed};
 

@@ -8,6 +8,7 @@ mod axes;
 mod blosc;
 mod codec;
 mod display;
+mod extension;
 mod half;
 #[cfg(feature = "http")]
 mod http;
