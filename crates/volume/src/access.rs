@@ -35,8 +35,8 @@ pub struct ReadOptions {
     pub channel: Option<u32>,
     /// The number, from 0, of the time to read of a file with several; `None` reads the first.
     pub time: Option<u32>,
-    /// The level, from 0 for the finest, to read of a store with several; `None` reads the one that a scene chooses
-    /// ([`Scene::choose_levels`](crate::Scene::choose_levels)), and without a scene the finest, which must fit in memory.
+    /// The level, from 0 for the finest, to read of a store with several; `None` reads the one that a renderer's
+    /// scene chooses, and without a scene the finest, which must fit in memory.
     pub level: Option<u32>,
     /// The file with the ranges of the values in a store's chunks, made by `sheetsplat index` ([`StoreIndex`](super::StoreIndex)). Where a scene's volume is
     /// streamed, chunks without visible values are not read.
