@@ -138,14 +138,12 @@ fn picks_name_the_channel() {
         (Classification::After, Compositing::Exponential),
         (Classification::After, Compositing::Surface),
     ];
-    for (backend, (classification, compositing)) in [Backend::Gpu, Backend::Cpu, Backend::Reference]
-        .into_iter()
-        .flat_map(|backend| modes.map(|mode| (backend, mode)))
-    {
+    let all = [Backend::Gpu, Backend::Cpu, Backend::Reference]
+        .map(|backend| Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap());
+    for (headless, (classification, compositing)) in all.iter().flat_map(|one| modes.map(|mode| (one, mode))) {
         let mut scene = scene.clone();
         (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
-        let what = format!("{backend} {classification:?} {compositing:?}");
-        let headless = Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap();
+        let what = format!("{} {classification:?} {compositing:?}", headless.backend());
         let mut view = headless.view(volume.clone(), &scene).unwrap();
         view.set_first_hit(Some(0.5)).unwrap();
         headless.draw(&mut view).unwrap();
