@@ -149,6 +149,7 @@ impl ChunkKeys {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use std::path::Path;
 
