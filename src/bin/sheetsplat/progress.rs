@@ -62,7 +62,7 @@ fn bar(template: &str, total: u64, is_wanted: bool) -> ProgressBar {
 
 /// A template is wrong only by a mistake in this file, which the test finds.
 fn style(template: &str) -> ProgressStyle {
-    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("##.")
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("#.")
 }
 
 #[cfg(test)]

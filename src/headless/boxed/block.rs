@@ -132,9 +132,10 @@ mod tests {
         for (low, end, outer, outer_end) in rims {
             let own = VoxelBox { low: low.into(), end: end.into() };
             let rim = Rim { own, within: VoxelBox { low: outer.into(), end: outer_end.into() } };
-            let mut wanted = 1;
+            let mut random = 1_u64;
             for _ in 0..200 {
-                wanted = wanted * 48271 % 0x7fff_ffff;
+                random = random * 48271 % 0x7fff_ffff;
+                let wanted = random as Parts;
                 let boxes = rim.boxes(wanted);
                 let voxels = (0..12).flat_map(|z| (0..12).flat_map(move |y| (0..12).map(move |x| UVec3::new(x, y, z))));
                 for voxel in voxels {
