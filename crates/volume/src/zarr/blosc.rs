@@ -74,7 +74,7 @@ fn decode_block(mut code: &[u8], compressor: u8, streams: usize, block: &mut [u8
             0 => blosc_lz(bytes, stream).ok_or("a damaged BloscLZ stream")?,
             1 => lz4_flex::block::decompress_into(bytes, stream).map_err(|error| error.to_string())?,
             3 => ZlibDecoder::new(bytes).read_exact(stream).map(|()| expected).map_err(|error| error.to_string())?,
-            4 => super::steps::zstandard(bytes, stream)?,
+            4 => super::zstandard::zstandard(bytes, stream)?,
             2 => return Err("Snappy, which is not read".to_owned()),
             other => return Err(format!("compressor {other}")),
         };

@@ -20,6 +20,7 @@ mod multiscale;
 mod number;
 mod shards;
 mod steps;
+mod zstandard;
 
 use std::path::Path;
 use std::sync::Arc;
