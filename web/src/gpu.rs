@@ -283,7 +283,7 @@ async fn scoped<T>(device: &Device, work: impl AsyncFnOnce() -> Result<T, JsValu
 /// Waits for what arrives from the GPU.
 async fn arrival<T>(mut try_get: impl FnMut() -> Option<T>) -> Result<T, JsValue> {
     /// Milliseconds, after which the device is lost.
-    const PATIENCE: f64 = 30_000.0;
+    const PATIENCE: f64 = 120_000.0;
     let start = now();
     loop {
         if let Some(arrived) = try_get() {
