@@ -73,8 +73,8 @@ impl Simd {
     }
 }
 
-/// Compiles code once for each instruction set, and runs it for that of a level. Each set takes the compiler as long as all the rest of the native backend, so
-/// that x86 has three: SSE2 serves processors with SSE4.2, too.
+/// Compiles code once for each instruction set, and runs it for that of a level. Every set lengthens the build by all kernels, so x86 has three: SSE2 serves
+/// processors with SSE4.2, too.
 macro_rules! dispatch {
     ($level:expr, $simd:ident => $code:expr) => {
         $crate::cpu::simd::dispatch!(@match $level, $simd => $code;

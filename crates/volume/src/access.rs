@@ -43,7 +43,7 @@ pub struct ReadOptions {
     pub index: Option<PathBuf>,
     /// Files in memory, which are read instead of the disk's; `None` reads the disk.
     pub files: Option<Files>,
-    /// What counts the bytes that are read, for programs that show how far they are.
+    /// The counter of bytes read, for programs that show progress.
     pub bytes_read: Option<BytesRead>,
 }
 
@@ -174,7 +174,7 @@ impl Access {
         }
     }
 
-    /// What is read of files with several volumes.
+    /// The volumes that are read from files with several.
     pub(crate) fn selection(&self) -> Selection {
         self.1
     }
@@ -216,7 +216,7 @@ impl Access {
         resolved.map(Cow::Owned).map_err(io_error(path))
     }
 
-    /// What counts the bytes that are read.
+    /// The counter of bytes read.
     pub(super) fn bytes_read(&self) -> Option<BytesRead> {
         self.0.bytes_read.clone()
     }

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Those of the kernel that was last asked for, shared by all clones of a volume.
+/// The coefficients for the last kernel that was requested, shared by all clones of a volume.
 #[derive(Clone, Debug, Default)]
 pub(super) struct KeptCoefficients(Arc<Mutex<Option<Kept>>>);
 

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// What is read of a store for a frame, or for a volume that is read as a whole (SPEC §13).
+/// How much of a store is read for a frame, or for a volume that is read whole (SPEC §13).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct StoreCounts {
@@ -10,7 +10,7 @@ pub struct StoreCounts {
     pub level: u64,
     /// The chunks of the level, in all channels that are read.
     pub chunks_total: u64,
-    /// Those of them that were read. Each counts once, although it may have been read again.
+    /// The number of those chunks that were read. A chunk that is read again counts once.
     pub chunks_read: u64,
     /// The bytes of the store that reading them took, without those of reading again what was dropped.
     pub bytes_read: u64,
@@ -19,6 +19,6 @@ pub struct StoreCounts {
     pub chunk_bytes: u64,
     /// The chunks that were read for the sample of a volume that is streamed.
     pub sample_chunks_read: u64,
-    /// Their bytes in the store.
+    /// The bytes of those chunks in the store.
     pub sample_bytes_read: u64,
 }

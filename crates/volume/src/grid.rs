@@ -32,7 +32,7 @@ pub fn dims_of<N: TryInto<u32>>(sizes: [N; 3]) -> Option<UVec3> {
     (voxels > 0).then_some(UVec3::new(x, y, z))
 }
 
-/// What [`dims_of`] accepts, for errors.
+/// The sizes that [`dims_of`] accepts, for errors.
 pub const SIZES: &str = "three positive integers, at most 4294967295 voxels";
 
 /// A rectilinear grid (SPEC §2) whose centre is the world's origin, or, of a coarser level (SPEC §13), where its level lies.

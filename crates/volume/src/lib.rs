@@ -108,7 +108,7 @@ pub use volume::Volume;
 
 pub use glam;
 
-/// What the renderer uses besides. Nothing here is part of the public interface; it changes without notice.
+/// Items that only the renderer needs. They are not part of the public interface and change without notice.
 #[doc(hidden)]
 pub mod internals {
     pub use crate::access::Access;

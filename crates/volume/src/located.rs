@@ -16,5 +16,5 @@ pub(super) struct Located {
     pub(super) series: Series,
 }
 
-/// What readers note in place of reading samples.
+/// The places of samples, which readers note instead of reading them.
 pub(super) type Notes = Mutex<Vec<Located>>;

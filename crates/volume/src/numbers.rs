@@ -7,7 +7,7 @@ use super::sample_type::SampleType;
 /// The maximum number of bytes in a number.
 const MAX_TOKEN: usize = 64;
 
-/// What ends a text of numbers, besides the end of the file.
+/// The character that ends a text of numbers; the end of the file ends it too.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum TextEnd {
     /// Only the end of the file.

@@ -14,7 +14,7 @@ use super::voxel::{Many, Voxel};
 /// The voxels that are converted at a time.
 const BLOCK: usize = 1 << 14;
 
-/// What a header says about the samples, one per voxel of the grid.
+/// A header's description of the samples, one per voxel of the grid.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Samples {
     pub(super) kind: SampleType,

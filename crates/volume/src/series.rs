@@ -38,7 +38,7 @@ pub(super) enum SeriesOrder {
     TimesFirst,
 }
 
-/// What is read of a file with several volumes.
+/// The volumes that are read from a file with several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
     /// The number of the only channel; `None` for all.

@@ -76,7 +76,7 @@ pub trait Store: Send + Sync + Debug {
         None
     }
 
-    /// What the file states beside grids and values.
+    /// The facts that the file states beside grids and values.
     fn facts(&self) -> StoreFacts {
         StoreFacts::default()
     }
@@ -90,7 +90,7 @@ pub(super) fn values_of(levels: &[StoreLevel], level: usize) -> u64 {
     levels.get(level).map_or(0, |level| level.grid.voxels())
 }
 
-/// What a file states about a volume beside its grid and values.
+/// The facts that a file states about a volume beside its grid and values.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct StoreFacts {

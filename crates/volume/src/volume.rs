@@ -44,7 +44,7 @@ pub struct Volume {
     pub(super) further: Vec<Arc<Volume>>,
     pub(super) levels: Vec<UVec3>,
     pub(super) level: u32,
-    /// What was read of a store; not part of the volume itself.
+    /// How much of a store was read; not part of the volume itself.
     pub(super) reads: Option<StoreCounts>,
     /// The grid of the voxels that the values are a sample of, if they are one.
     pub(super) sampled: Option<Grid>,
@@ -66,7 +66,7 @@ impl PartialEq for Volume {
     }
 }
 
-/// What a channel of a volume without values has ([`Volume::hollow`]).
+/// The arrays of a channel whose volume has no values ([`Volume::hollow`]).
 #[derive(Clone, Copy, Debug)]
 pub struct HollowChannel {
     /// Whether it has labels.
@@ -205,7 +205,7 @@ impl Volume {
         self.level
     }
 
-    /// What was read of a store for this volume, with all channels; `None` if it comes from no store.
+    /// How much of a store was read for this volume, with all channels; `None` if it comes from no store.
     pub fn reads(&self) -> Option<StoreCounts> {
         self.reads
     }

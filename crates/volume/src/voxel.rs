@@ -1,4 +1,4 @@
-//! What the samples of files become: values, or labels.
+//! The numbers that the samples of files become: values, or labels.
 
 use std::collections::TryReserveError;
 
@@ -107,7 +107,7 @@ impl Many<u16> for Vec<u16> {
     }
 }
 
-/// What samples are converted to: values or labels.
+/// A number that samples are converted to: a value or a label.
 pub trait Voxel: Copy + Send + Sync {
     /// Many of them.
     type Many: Many<Self>;

@@ -14,9 +14,9 @@ pub struct SettingError {
     /// The scene file's key, with elements counted from 0 (`camera.up`, `transfer.opacity[2][1]`), or the name of a parameter that scene
     /// files do not have. The tables of labels have the label's number as their index: `transfer.label[7].opacity`.
     pub key: String,
-    /// What was found.
+    /// The value found.
     pub found: Found,
-    /// What is allowed.
+    /// The values that are allowed.
     pub allowed: Allowed,
 }
 

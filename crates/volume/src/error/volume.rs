@@ -27,9 +27,9 @@ pub enum VolumeError {
         origin: String,
         /// The header field or the part of the file (`sizes`, `space directions`, `data`).
         field: String,
-        /// What was found there.
+        /// The value found there.
         found: String,
-        /// What would have been accepted.
+        /// The values that are allowed there.
         allowed: String,
     },
 }

@@ -8,6 +8,6 @@ pub use rayon::{ThreadPool, ThreadPoolBuilder, current_num_threads, join, prelud
 #[cfg(target_arch = "wasm32")]
 pub use sequential::{Indexed, ThreadPool, ThreadPoolBuilder, current_num_threads, prelude};
 
-/// What a function returns for each index of a range.
+/// The results of a function for each index of a range.
 #[cfg(not(target_arch = "wasm32"))]
 pub type Indexed<F> = rayon::iter::Map<rayon::range::Iter<usize>, F>;

@@ -1,4 +1,4 @@
-//! What the library uses of rayon, as loops over iterators. Results are those of rayon, since no result depends on the number of threads (SPEC §12).
+//! The part of rayon that the library uses, as loops over iterators. Results are those of rayon, since no result depends on the number of threads (SPEC §12).
 
 use std::convert::Infallible;
 use std::iter::{Enumerate, Filter, FilterMap, FlatMap, Map, Zip};
@@ -17,7 +17,7 @@ pub fn current_num_threads() -> usize {
 /// other arguments than there.
 pub struct Loop<I>(I);
 
-/// What a function returns for each index of a range.
+/// The results of a function for each index of a range.
 pub type Indexed<F> = Loop<Map<Range<usize>, F>>;
 
 impl<I: Iterator> Iterator for Loop<I> {

@@ -1,4 +1,4 @@
-//! What metadata name: data types, grids, key encodings, codecs, each with a configuration.
+//! Names in metadata (of data types, grids, key encodings, codecs), each with a configuration.
 
 use serde_json::Value;
 

@@ -1,4 +1,4 @@
-//! What the metadata of an array state: `zarr.json` of [version 3] and `.zarray` of [version 2].
+//! The metadata of an array as plain data: `zarr.json` of [version 3] and `.zarray` of [version 2].
 //!
 //! [version 3]: <https://zarr-specs.readthedocs.io/en/latest/v3/core/index.html>
 //! [version 2]: <https://zarr-specs.readthedocs.io/en/latest/v2/v2.0.html>
@@ -16,7 +16,7 @@ use super::keys::Keys;
 use super::number::Number;
 use super::steps::Step;
 
-/// What an array's metadata state.
+/// An array's metadata.
 pub(super) struct Metadata {
     pub(super) shape: Vec<u64>,
     pub(super) number: Number,

@@ -53,7 +53,7 @@ impl Number {
         }
     }
 
-    /// What a fill value may be.
+    /// The fill values that are allowed, for errors.
     pub(super) fn fills(self) -> String {
         match self {
             Self::Bool => "true or false".to_owned(),
