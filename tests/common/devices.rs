@@ -1,7 +1,5 @@
 //! The devices that tests draw on, and everything that draws whole frames.
 
-use std::sync::LazyLock;
-
 use sheetsplat::DeviceRequirements;
 use sheetsplat::cpu;
 use sheetsplat::headless::{GpuHeadless, HeadlessOptions, Rendering};
@@ -11,6 +9,7 @@ use sheetsplat::volume::Volume;
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 
 use super::adapter::adapter;
+use super::pool::{Lent, Pool};
 
 /// Everything that draws whole frames: the rasterizers on the GPU, and the native backend.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,14 +56,14 @@ pub(crate) fn on_adapter() -> HeadlessOptions {
     HeadlessOptions::default().with_adapter(adapter())
 }
 
-/// A device as the program opens it, with f32 sheets. All tests of a process share it, because compiling its pipelines takes longer than most tests do. The
-/// test fails without a GPU or software driver.
+/// A device as the program opens it, with f32 sheets, that this test has to itself while it runs. The test fails without a GPU or software driver.
 pub(crate) fn gpu() -> &'static GpuHeadless {
-    static SHARED: LazyLock<GpuHeadless> = LazyLock::new(new_gpu);
-    &SHARED
+    static POOL: Pool<GpuHeadless> = Pool::new();
+    thread_local!(static LENT: Lent<GpuHeadless> = POOL.lend(new_gpu));
+    LENT.with(|lent| lent.thing)
 }
 
-/// Such a device for one test alone.
+/// Such a device that no other test has used.
 pub(crate) fn new_gpu() -> GpuHeadless {
     let options = on_adapter().with_sheet_format(TextureFormat::Rgba32Float);
     GpuHeadless::new(&options).unwrap_or_else(|error| panic!("the adapter that the tests draw on: {error}"))

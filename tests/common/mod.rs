@@ -1,10 +1,12 @@
 //! Helpers that several tests share.
 
 pub(crate) mod adapter;
+pub(crate) mod cases;
 pub(crate) mod compare;
 #[cfg(feature = "gpu")]
 pub(crate) mod devices;
 pub(crate) mod images;
+pub(crate) mod pool;
 pub(crate) mod shared;
 pub(crate) mod store;
 #[cfg(feature = "gpu")]

@@ -10,8 +10,9 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Classification, Compositing, Gradient, Order, Projection, Ramp};
 use sheetsplat::volume::{Volume, builtin};
 
+use crate::common::cases::{in_turns, pairs};
 use crate::common::compare::{assert_at_most, largest};
-use crate::common::devices::{DRAWINGS, Drawing, drawn_forms, gpu};
+use crate::common::devices::{DRAWINGS, Drawing, drawn_forms, gpu, new_gpu};
 use crate::common::images::largest_difference;
 use crate::common::{COMPOSITINGS, F16, F32, Random, camera, scene, transfer};
 
@@ -43,10 +44,13 @@ fn empty_volume_is_exactly_the_background() {
     let mut excluded = visible.clone();
     excluded.iso_ranges = Some(vec![[1000.0, 2000.0]]);
     let elsewhere = DVec3::new(1e4, 0.0, 0.0);
-    for (transfer, center) in [(transparent, DVec3::ZERO), (excluded, DVec3::ZERO), (visible, elsewhere)] {
+    let cases = [(transparent, DVec3::ZERO), (excluded, DVec3::ZERO), (visible, elsewhere)];
+    let orders = [Order::FrontToBack, Order::BackToFront];
+    for (number, (transfer, center)) in cases.into_iter().enumerate() {
         (scene.transfer, scene.camera.center) = (transfer, Some(center));
-        for (compositing, order) in
-            COMPOSITINGS.into_iter().flat_map(|c| [Order::FrontToBack, Order::BackToFront].map(|order| (c, order)))
+        for (compositing, order) in (number..)
+            .zip(COMPOSITINGS)
+            .flat_map(|(turn, compositing)| in_turns(turn, orders).into_iter().map(move |order| (compositing, order)))
         {
             (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
             if scene.splatting.check().is_err() {
@@ -222,11 +226,13 @@ fn back_to_front_equals_front_to_back() {
     // Close by in perspective, footprints of nearer sections reach onto the screen where farther ones do not.
     let close = Projection::Perspective { fov_y: 50.0, distance: Some(45.0), near: None };
     let projections = [scene.camera.projection, close];
-    let both_ways = COMPOSITINGS.into_iter().filter(|&compositing| compositing != Compositing::Surface);
-    let cases = both_ways.flat_map(|compositing| drawn_forms().map(move |drawn| (compositing, drawn)));
-    for ((compositing, (drawing, form)), projection) in
-        cases.flat_map(|case| projections.map(|projection| (case, projection)))
-    {
+    let forms: Vec<_> = drawn_forms().collect();
+    for [compositing, drawn, projection] in pairs([COMPOSITINGS.len(), forms.len(), 2]) {
+        let (compositing, (drawing, form), projection) =
+            (COMPOSITINGS[compositing], forms[drawn], projections[projection]);
+        if compositing == Compositing::Surface {
+            continue;
+        }
         (scene.splatting.compositing, scene.camera.projection) = (compositing, projection);
         scene.splatting.footprint = form;
         scene.splatting.order = Order::FrontToBack;
@@ -245,7 +251,7 @@ fn back_to_front_equals_front_to_back() {
 #[test]
 fn every_run_gives_the_same_bytes() {
     let (volume, mut scene) = head();
-    let (first, second) = (gpu(), gpu());
+    let (first, second) = (gpu(), &new_gpu());
     let perspective = Projection::Perspective { fov_y: 60.0, distance: None, near: None };
     let projections = [scene.camera.projection, perspective, perspective];
     let cases = COMPOSITINGS.into_iter().zip(projections.into_iter().cycle());
@@ -271,7 +277,7 @@ fn every_run_after_splatting_gives_the_same_bytes() {
     let (volume, mut scene) = head();
     scene.splatting.classification = Classification::After;
     scene.transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (120.0, 0.9)]).unwrap());
-    let (first, second) = (gpu(), gpu());
+    let (first, second) = (gpu(), &new_gpu());
     let perspective = Projection::Perspective { fov_y: 60.0, distance: None, near: None };
     let projections = [scene.camera.projection, perspective];
     for (compositing, drawing) in COMPOSITINGS.into_iter().flat_map(|of| DRAWINGS.map(|drawing| (of, drawing))) {

@@ -15,21 +15,23 @@ use sheetsplat::{Image, Part};
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::largest_difference;
+use crate::common::pool::{Lent, Pool};
 use crate::common::{COMPOSITINGS, scene};
 
 /// By how much a merged image may differ from the whole one (SPEC §11).
 const ALLOWED: f64 = 1e-6;
 
-/// What draws by a backend, which all tests of a process share, because compiling a GPU's pipelines takes longer than most of them.
+/// What draws by a backend.
 pub(crate) fn headless(backend: Backend) -> &'static Headless {
-    static GPU: LazyLock<Headless> = LazyLock::new(|| new(Backend::Gpu));
+    static GPUS: Pool<Headless> = Pool::new();
     static CPU: LazyLock<Headless> = LazyLock::new(|| new(Backend::Cpu));
     static REFERENCE: LazyLock<Headless> = LazyLock::new(|| new(Backend::Reference));
+    thread_local!(static GPU: Lent<Headless> = GPUS.lend(|| new(Backend::Gpu)));
     fn new(backend: Backend) -> Headless {
         Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap()
     }
     match backend {
-        Backend::Gpu => &GPU,
+        Backend::Gpu => GPU.with(|lent| lent.thing),
         Backend::Cpu => &CPU,
         Backend::Reference => &REFERENCE,
         _ => panic!("{backend:?} is no backend that tests name"),

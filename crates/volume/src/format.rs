@@ -295,3 +295,21 @@ fn read_folder<T: Voxel>(
 fn needs(name: &str, feature: &str) -> String {
     format!("{name}, which needs the feature `{feature}`")
 }
+
+#[cfg(all(test, not(feature = "nifti")))]
+mod tests {
+    use std::path::Path;
+
+    use crate::Volume;
+
+    #[test]
+    fn formats_left_out_are_named() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fixtures/sform.nii");
+        let message = Volume::open(&file).unwrap_err().to_string();
+        for part in
+            ["format: found NIfTI, which needs the feature `nifti`, allowed: NRRD (", "not compiled in: NIfTI (.nii"]
+        {
+            assert!(message.contains(part), "{message}");
+        }
+    }
+}

@@ -13,6 +13,7 @@ use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Labels, Volume, builtin};
 
 use crate::after::{eye, render, scene};
+use crate::common::cases::{in_turns, pairs};
 use crate::common::compare::{assert_at_least, assert_at_most, decibels};
 use crate::common::devices::{Drawing, gpu};
 use crate::common::images::{largest_difference, rms};
@@ -84,25 +85,23 @@ fn for_all(mut scene: Scene, compositing: Compositing) -> Scene {
 #[test]
 fn images_are_the_twins() {
     let gpu = gpu();
-    for spacing in [[1.0, 1.0, 1.0], [1.0, 1.0, 2.5]] {
+    let (spacings, ways) = (
+        [[1.0, 1.0, 1.0], [1.0, 1.0, 2.5]],
+        [(Interpolation::Smooth, Gradient::Differences, 2.0), (Interpolation::Exact, Gradient::Kernel, 1.0)],
+    );
+    for [compositing, projection, way, spacing] in pairs([COMPOSITINGS.len(), 3, ways.len(), spacings.len()]) {
+        let (compositing, spacing) = (COMPOSITINGS[compositing], spacings[spacing]);
         let (volume, base) = head(spacing);
-        let textured = textured(&volume);
-        for compositing in COMPOSITINGS {
-            for (interpolation, gradient, falloff) in
-                [(Interpolation::Smooth, Gradient::Differences, 2.0), (Interpolation::Exact, Gradient::Kernel, 1.0)]
-            {
-                for projection in [base.camera.projection, eye(60.0), eye(9.0)] {
-                    let mut scene = for_all(base.clone(), compositing);
-                    scene.camera.projection = projection;
-                    scene.splatting.interpolation = interpolation;
-                    (scene.shading.gradient, scene.splatting.falloff) = (gradient, falloff);
-                    let volume = if compositing == Compositing::Minimum { &textured } else { &volume };
-                    let case = format!("{spacing:?} {compositing:?} {interpolation:?} {projection:?}");
-                    let required = if gradient == Gradient::Kernel { 55.0 } else { 60.0 };
-                    assert_twins(gpu, (volume, &scene), required, &case);
-                }
-            }
-        }
+        let projection = [base.camera.projection, eye(60.0), eye(9.0)][projection];
+        let mut scene = for_all(base, compositing);
+        scene.camera.projection = projection;
+        let gradient;
+        (scene.splatting.interpolation, gradient, scene.splatting.falloff) = ways[way];
+        scene.shading.gradient = gradient;
+        let volume = if compositing == Compositing::Minimum { textured(&volume) } else { volume };
+        let case = format!("{spacing:?} {compositing:?} {gradient:?} {projection:?}");
+        let required = if gradient == Gradient::Kernel { 55.0 } else { 60.0 };
+        assert_twins(gpu, (&volume, &scene), required, &case);
     }
 }
 
@@ -138,11 +137,10 @@ fn settings_are_the_twins() {
         }),
     ];
     for (at, projection) in [None, Some(eye(50.0))].into_iter().enumerate() {
-        for (name, change) in &cases {
-            for (number, compositing) in COMPOSITINGS.into_iter().enumerate() {
-                // Of the other compositings each case tests a half in every projection. Surfaces are found front to back only.
-                let is_refused = *name == "back to front" && compositing == Compositing::Surface;
-                if is_refused || compositing != Compositing::Exponential && (number + at) % 2 == 0 {
+        for (turn, (name, change)) in cases.iter().enumerate() {
+            for compositing in in_turns(2 * turn + at, COMPOSITINGS) {
+                // Surfaces are found front to back only.
+                if *name == "back to front" && compositing == Compositing::Surface {
                     continue;
                 }
                 let (volume, scene) = head([1.0, 1.0, 1.5]);
@@ -162,10 +160,10 @@ fn settings_are_the_twins() {
 fn culling_keeps_its_promise() {
     const THRESHOLD: f64 = 0.9;
     let gpu = gpu();
-    for compositing in
-        [Compositing::Linear, Compositing::Exponential, Compositing::Xray, Compositing::Maximum, Compositing::Surface]
-    {
-        for projection in [None, Some(eye(600.0))] {
+    let compositings =
+        [Compositing::Linear, Compositing::Exponential, Compositing::Xray, Compositing::Maximum, Compositing::Surface];
+    for (turn, compositing) in compositings.into_iter().enumerate() {
+        for projection in in_turns(turn, [None, Some(eye(600.0))]) {
             // Large enough for much to be hidden.
             let (volume, mut scene) = (builtin::volume("head:48").unwrap(), head([1.0, 1.0, 1.0]).1);
             scene.camera = camera([0.4, 0.9, -0.3], 300.0);
@@ -201,8 +199,8 @@ fn culling_keeps_its_promise() {
 #[test]
 fn holes_and_labels_are_the_twins() {
     let gpu = gpu();
-    for compositing in COMPOSITINGS {
-        for projection in [None, Some(eye(50.0))] {
+    for (turn, compositing) in COMPOSITINGS.into_iter().enumerate() {
+        for projection in in_turns(turn, [None, Some(eye(50.0))]) {
             let mut scene = for_all(head([1.0, 1.0, 1.5]).1, compositing);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
             holes_and_labels(gpu, scene);
@@ -256,7 +254,7 @@ fn constant_regions_have_no_normal() {
 fn surfaces_and_first_hits_are_the_twins() {
     let gpu = gpu();
     for (case, compositing) in (0..).zip(COMPOSITINGS) {
-        for projection in [None, Some(eye(60.0))] {
+        for projection in in_turns(case as usize, [None, Some(eye(60.0))]) {
             let (volume, scene) = head([1.0, 1.0, 1.5]);
             let mut scene = for_all(scene, compositing);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
@@ -331,8 +329,8 @@ fn what_is_left_out_shows_nothing() {
 #[test]
 fn counts_are_the_twins() {
     let gpu = gpu();
-    for compositing in COMPOSITINGS {
-        for projection in [None, Some(eye(200.0))] {
+    for (turn, compositing) in COMPOSITINGS.into_iter().enumerate() {
+        for projection in in_turns(turn, [None, Some(eye(200.0))]) {
             // One bright voxel and one dark voxel, one of which has an opacity.
             let volume =
                 crate::after::volume([30, 26, 34], DVec3::new(1.0, 1.0, 1.5), |voxel| match voxel.to_array() {

@@ -7,6 +7,7 @@ use sheetsplat::volume::{SampleType, Volume};
 use sheetsplat::{GpuVolume, Scene};
 
 use super::{CLASSIFICATIONS, NATIVE, draw};
+use crate::common::cases::in_turns;
 use crate::common::compare::{assert_at_least, assert_at_most, decibels};
 use crate::common::devices::gpu;
 use crate::common::images::{largest_difference, rms};
@@ -91,10 +92,10 @@ fn assert_is_the_twins(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) {
 fn the_gpu_draws_what_the_twin_draws() {
     let gpu = gpu();
     let mut random = Random(52);
-    for (classification, compositing) in
-        CLASSIFICATIONS.into_iter().flat_map(|c| COMPOSITINGS.map(|compositing| (c, compositing)))
+    for (turn, (classification, compositing)) in
+        CLASSIFICATIONS.into_iter().flat_map(|c| COMPOSITINGS.map(|compositing| (c, compositing))).enumerate()
     {
-        for interpolation in [Interpolation::Smooth, Interpolation::Exact] {
+        for interpolation in in_turns(turn, [Interpolation::Smooth, Interpolation::Exact]) {
             if interpolation == Interpolation::Exact && classification == Classification::Before {
                 continue;
             }
@@ -110,8 +111,11 @@ fn the_gpu_draws_what_the_twin_draws() {
 fn the_gpu_draws_colours_of_any_channel() {
     let gpu = gpu();
     let mut random = Random(56);
-    for (round, (classification, compositing)) in
-        CLASSIFICATIONS.into_iter().flat_map(|c| COMPOSITINGS.map(|compositing| (c, compositing))).enumerate()
+    for (round, (classification, compositing)) in COMPOSITINGS
+        .into_iter()
+        .enumerate()
+        .flat_map(|(turn, compositing)| in_turns(turn, CLASSIFICATIONS).into_iter().map(move |c| (c, compositing)))
+        .enumerate()
     {
         let (first, mut scene) = colored(&mut random, DVec3::ONE);
         let (second, _) = colored(&mut random, DVec3::ONE);

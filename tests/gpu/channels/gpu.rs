@@ -13,6 +13,7 @@ use sheetsplat::wgpu::{Features, Limits, TextureFormat};
 use sheetsplat::{DeviceRequirements, GpuVolume, Image, Scene, SceneView};
 
 use super::{BY_SUMS, CLASSIFICATIONS, draw, joined, random_case, set_transfers, single};
+use crate::common::cases::in_turns;
 use crate::common::compare::{assert_at_least, assert_at_most, decibels};
 use crate::common::devices::{gpu, on_adapter};
 use crate::common::images::{largest_difference, rms};
@@ -22,9 +23,11 @@ fn by(rasterizer: Rasterizer, scene: &Scene) -> Scene {
     Scene { splatting: Splatting { rasterizer, ..scene.splatting }, ..scene.clone() }
 }
 
-/// Both ways to classify, with every compositing.
+/// Every compositing, with either way to classify.
 fn modes() -> impl Iterator<Item = (Classification, Compositing)> {
-    CLASSIFICATIONS.into_iter().flat_map(|classification| COMPOSITINGS.map(|compositing| (classification, compositing)))
+    COMPOSITINGS.into_iter().enumerate().flat_map(|(turn, compositing)| {
+        in_turns(turn, CLASSIFICATIONS).into_iter().map(move |classification| (classification, compositing))
+    })
 }
 
 /// The rasterizers that draw several channels.
@@ -74,7 +77,8 @@ fn assert_is_the_twins(gpu: &GpuHeadless, volume: &Volume, scene: &Scene, what: 
 fn whole_frames_are_those_of_the_twin() {
     let gpu = gpu();
     let mut random = Random(121);
-    for (round, (classification, compositing)) in modes().chain(modes()).enumerate() {
+    let both = CLASSIFICATIONS.into_iter().flat_map(|of| COMPOSITINGS.map(|compositing| (of, compositing)));
+    for (round, (classification, compositing)) in both.enumerate() {
         let count = 2 + round % 3;
         let (volume, mut scene) = random_case(&mut random, count);
         (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);

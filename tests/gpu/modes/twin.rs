@@ -9,6 +9,7 @@ use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Compositing, Method, Order};
 use sheetsplat::volume::builtin;
 
+use crate::common::cases::{cases, in_turns};
 use crate::common::compare::assert_at_most;
 use crate::common::devices::{DRAWINGS, gpu};
 use crate::common::{BY_MEANS, Random, camera, scene, transfer};
@@ -32,8 +33,8 @@ fn any_view_equals_the_reference() {
     for compositing in BY_MEANS {
         let mut shown = 0;
         let mut off = [0.0; 3];
-        const CASES: usize = 16;
-        for case in 0..CASES {
+        let cases = cases(5, 16);
+        for case in 0..cases {
             let (volume, mut scene) = random_case(&mut random);
             scene.splatting.compositing = compositing;
             let walls = random.bits().is_multiple_of(3);
@@ -55,7 +56,7 @@ fn any_view_equals_the_reference() {
                 let HostFrame { image, hits, .. } = draw_for_host(drawing, gpu, (&volume, &scene), host, &[]);
                 // Quads round amounts to f16.
                 let share = share_off(&image.pixels, &expected.image.pixels, 2e-3);
-                *off += share / CASES as f64;
+                *off += share / cases as f64;
                 assert_at_most(share, 8.0 * OUTLIERS, format_args!("case {case}, {drawing:?}: pixels with {scene:?}"));
                 assert_eq!(hits.len(), expected.first_hits.len());
                 let is_close = |(hit, expected): &(&f64, &f64)| {
@@ -71,7 +72,7 @@ fn any_view_equals_the_reference() {
         }
         println!("{compositing:?}: {off:.5?} of the pixels are off by {DRAWINGS:?}");
         off.into_iter().for_each(|off| assert_at_most(off, OUTLIERS, format_args!("{compositing:?}: pixels")));
-        assert!(shown >= CASES / 3, "{compositing:?}: only {shown} cases show much");
+        assert!(shown >= cases / 3, "{compositing:?}: only {shown} cases show much");
     }
 }
 
@@ -79,7 +80,7 @@ fn any_view_equals_the_reference() {
 #[test]
 fn thin_volumes() {
     let gpu = gpu();
-    for (dims, direction) in [
+    let views = [
         ([1, 9, 9], DVec3::X),
         ([1, 9, 9], DVec3::new(1.0, 0.4, 0.3)),
         ([9, 9, 1], DVec3::NEG_Z),
@@ -87,10 +88,13 @@ fn thin_volumes() {
         ([2, 9, 9], DVec3::X),
         ([1, 1, 1], DVec3::new(0.5, 0.7, -0.4)),
         ([4, 4, 4], DVec3::Y),
-    ] {
-        for (compositing, method) in
-            BY_MEANS.into_iter().flat_map(|c| [Method::ImageAligned, Method::AxisAligned].map(|method| (c, method)))
-        {
+    ];
+    for (number, (dims, direction)) in views.into_iter().enumerate() {
+        for (compositing, method) in BY_MEANS.into_iter().enumerate().flat_map(|(turn, compositing)| {
+            in_turns(turn + number, [Method::ImageAligned, Method::AxisAligned])
+                .into_iter()
+                .map(move |method| (compositing, method))
+        }) {
             let (volume, mut scene) = constant(dims, DVec3::ONE);
             scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.9)]);
             scene.camera = camera(direction.to_array(), 3.0);

@@ -9,7 +9,6 @@ mod dependencies;
 mod depth;
 mod devices;
 mod faults;
-mod formats;
 mod passes;
 mod sharing;
 mod targets;
