@@ -54,7 +54,7 @@ def render(
     ----------
     source : path, array or Scene
         What is drawn. Every worker reads a path itself, so it must mean the same file on all of them; an array is
-        sent to them. A scene, or the path of a scene file, names its volume.
+        sent to them, and one of Dask is computed first. A scene, or the path of a scene file, names its volume.
     scene : Scene, mapping, str or path, optional
         How it is drawn, as for `View`.
     client : distributed.Client, optional
@@ -178,8 +178,11 @@ def _sent(
             path = os.fsdecode(source)
             source = path if path.startswith(_BUILTIN) or "://" in path else os.path.abspath(path)
     index = None if index is None else os.path.abspath(index)
-    sent = _Source(uuid.uuid4().hex, source, look, spacing, labels, memory, index)
-    return client.scatter(sent, hash=False), look
+    token = uuid.uuid4().hex
+    if dask.is_dask_collection(source) or dask.is_dask_collection(labels):
+        # The cluster computes it before the parts: a part that computed it would wait for the workers that wait for it.
+        return _task(_Source, "source")(token, source, look, spacing, labels, memory, index), look
+    return client.scatter(_Source(token, source, look, spacing, labels, memory, index), hash=False), look
 
 
 def _count(client: Client, parts: int | None) -> int:

@@ -115,6 +115,14 @@ impl From<RenderError> for Raised {
     }
 }
 
+/// The exception for what does not survive a fork.
+pub(crate) fn forked(what: &str) -> Raised {
+    let message = format!(
+        "{what}: found a forked process, allowed: the process that imported sheetsplat, or one that is spawned"
+    );
+    Raised(classes::DeviceError::new_err(message))
+}
+
 impl From<DeviceError> for Raised {
     fn from(error: DeviceError) -> Self {
         Self(classes::DeviceError::new_err(error.to_string()))

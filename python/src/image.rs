@@ -9,6 +9,7 @@ use sheetsplat::Image;
 use sheetsplat::image::{PngDepth, output};
 
 use crate::error::{self, Raised, setting};
+use crate::process::detached;
 
 /// The pixels as an array height × width × 4 that owns them.
 pub(crate) fn array(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
@@ -48,13 +49,13 @@ pub(crate) fn check_format(path: PathBuf) -> PyResult<()> {
 #[pyfunction]
 pub(crate) fn save(py: Python<'_>, array: PyReadonlyArray3<'_, f32>, path: PathBuf, depth: u8) -> PyResult<()> {
     let (image, depth) = (image(&array)?, png_depth(depth)?);
-    Ok(py.detach(|| image.save(&path, depth).map_err(Raised::from))?)
+    Ok(detached(py, || image.save(&path, depth).map_err(Raised::from))?)
 }
 
 /// Writes a whole file, as pictures are written: aside, and then renamed.
 #[pyfunction]
 pub(crate) fn write(py: Python<'_>, path: PathBuf, bytes: &[u8]) -> PyResult<()> {
-    Ok(py.detach(|| output::write(&path, bytes)).map_err(|source| error::file(&path, &source))?)
+    Ok(detached(py, || output::write(&path, bytes)).map_err(|source| error::file(&path, &source))?)
 }
 
 /// The bytes of a PNG.
@@ -65,6 +66,6 @@ pub(crate) fn encode<'py>(
     depth: u8,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let (image, depth) = (image(&array)?, png_depth(depth)?);
-    let bytes = py.detach(|| image.encode(Path::new("picture.png"), depth).map_err(Raised::from))?;
+    let bytes = detached(py, || image.encode(Path::new("picture.png"), depth).map_err(Raised::from))?;
     Ok(PyBytes::new(py, &bytes))
 }

@@ -7,6 +7,7 @@ mod error;
 mod golden;
 mod image;
 mod part;
+mod process;
 mod scene;
 mod settings;
 mod view;
@@ -29,4 +30,10 @@ mod _native {
     use crate::view::View;
     #[pymodule_export]
     use crate::volume::{BytesRead, Volume, check_sizes};
+
+    #[pymodule_init]
+    fn init(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        crate::process::is_forked();
+        Ok(())
+    }
 }

@@ -9,6 +9,7 @@ use sheetsplat::settings::{Region, Window};
 
 use crate::error::Raised;
 use crate::image;
+use crate::process::detached;
 use crate::scene::Scene;
 use crate::volume::Volume;
 
@@ -40,30 +41,30 @@ impl Part {
     /// The part in a file.
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Ok(py.detach(|| sheetsplat::part::Part::open(&path).map(Self).map_err(Raised::from))?)
+        Ok(detached(py, || sheetsplat::part::Part::open(&path).map(Self).map_err(Raised::from))?)
     }
 
     /// The part that [`Self::to_bytes`] gave.
     #[staticmethod]
     fn from_bytes(py: Python<'_>, name: &str, bytes: &[u8]) -> PyResult<Self> {
-        Ok(py.detach(|| sheetsplat::part::Part::from_exr(name, bytes).map(Self).map_err(Raised::from))?)
+        Ok(detached(py, || sheetsplat::part::Part::from_exr(name, bytes).map(Self).map_err(Raised::from))?)
     }
 
     /// Parts of the same pixels, whose slabs follow one another, as one part.
     #[staticmethod]
     fn join(py: Python<'_>, parts: Vec<Py<Self>>) -> PyResult<Self> {
         let parts: Vec<_> = parts.iter().map(|part| part.get().0.clone()).collect();
-        Ok(py.detach(|| sheetsplat::part::Part::join(parts).map(Self).map_err(Raised::from))?)
+        Ok(detached(py, || sheetsplat::part::Part::join(parts).map(Self).map_err(Raised::from))?)
     }
 
     /// Saves the part by the file's extension.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        Ok(py.detach(|| self.0.save(&path).map_err(Raised::from))?)
+        Ok(detached(py, || self.0.save(&path).map_err(Raised::from))?)
     }
 
     /// The bytes of an EXR file.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = py.detach(|| self.0.encode("part.exr".as_ref()).map_err(Raised::from))?;
+        let bytes = detached(py, || self.0.encode("part.exr".as_ref()).map_err(Raised::from))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
@@ -91,13 +92,13 @@ impl Part {
 #[pyfunction]
 pub(crate) fn merge<'py>(py: Python<'py>, parts: Vec<Py<Part>>) -> PyResult<Bound<'py, PyArray3<f32>>> {
     let parts: Vec<_> = parts.iter().map(|part| part.get().0.clone()).collect();
-    let merged = py.detach(|| sheetsplat::Image::merge(parts).map_err(Raised::from))?;
+    let merged = detached(py, || sheetsplat::Image::merge(parts).map_err(Raised::from))?;
     image::array(py, merged)
 }
 
 /// Parts of about equal work.
 #[pyfunction]
 pub(crate) fn split(py: Python<'_>, volume: &Volume, scene: &Scene, parts: usize) -> PyResult<Vec<Piece>> {
-    let windows = py.detach(|| sheetsplat::part::split(&volume.0, &scene.scene, parts).map_err(Raised::from))?;
+    let windows = detached(py, || sheetsplat::part::split(&volume.0, &scene.scene, parts).map_err(Raised::from))?;
     Ok(windows.iter().map(piece).collect())
 }

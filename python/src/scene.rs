@@ -9,6 +9,7 @@ use sheetsplat::scene::VolumeSource;
 use sheetsplat::volume::PatientSide;
 
 use crate::error::{Raised, setting};
+use crate::process::detached;
 use crate::settings;
 use crate::volume::{BytesRead, Volume, reading};
 
@@ -80,13 +81,13 @@ impl Scene {
         index: Option<PathBuf>,
     ) -> PyResult<Volume> {
         let options = reading(memory, index, bytes_read)?;
-        let (volume, _) = py.detach(|| self.scene.open_volume_and_files(&options).map_err(Raised::from))?;
+        let volume = detached(py, || self.scene.open_volume_with(&options).map_err(Raised::from))?;
         Ok(Volume(volume))
     }
 
     /// The scene with everything stated that depends on the volume; `all_around` for a camera that turns.
     fn explicit(&self, py: Python<'_>, volume: &Volume, all_around: bool) -> PyResult<Self> {
-        let explicit = py.detach(|| {
+        let explicit = detached(py, || {
             let (scene, volume) = (&self.scene, volume.0.sample());
             scene.check_volume(volume)?;
             Ok::<_, Raised>(if all_around { scene.explicit_all_around(volume) } else { scene.explicit(volume) })

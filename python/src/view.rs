@@ -7,10 +7,12 @@ use numpy::PyArray3;
 use pyo3::prelude::*;
 use sheetsplat::golden::Subject;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions, HeadlessView};
+use sheetsplat::scene::OpenVolume;
 
-use crate::error::{Raised, setting};
+use crate::error::{Raised, forked, setting};
 use crate::image;
 use crate::part::{Part, window};
+use crate::process::{detached, is_forked};
 use crate::scene::Scene;
 use crate::volume::Volume;
 
@@ -22,6 +24,8 @@ type Drawn<'py> = (Bound<'py, PyArray3<f32>>, String, Option<(String, String)>);
 pub(crate) struct View {
     headless: Arc<Headless>,
     current: Mutex<Current>,
+    /// The process that made it, without which a device, and the threads that read a volume while it is drawn, are gone.
+    bound_to: Option<u32>,
 }
 
 /// What a view draws next.
@@ -34,6 +38,12 @@ struct Current {
 }
 
 impl View {
+    /// Checks that what the view draws with is in this process.
+    fn check_process(&self) -> Result<(), Raised> {
+        let is_here = self.bound_to.is_none_or(|process| process == std::process::id());
+        if is_here { Ok(()) } else { Err(forked("a view that was made before")) }
+    }
+
     /// A picture that failed leaves a view that can draw the next one.
     fn lock(&self) -> MutexGuard<'_, Current> {
         self.current.lock().unwrap_or_else(PoisonError::into_inner)
@@ -48,20 +58,24 @@ impl View {
             setting("backend", &format!("{backend:?}"), allowed.trim_start_matches("allowed: "))
         })?;
         let volume = volume.0.clone();
-        let view = py.detach(|| {
+        let is_streamed = matches!(volume, OpenVolume::Streamed(_));
+        let view = detached(py, || {
             let headless = headless(backend, adapter, &scene.scene)?;
             let start = Instant::now();
             let view = headless.view(volume, &scene.scene)?;
             let current = Current { view, size: size(scene), prepare_ms: milliseconds_since(start) };
             let current = Mutex::new(current);
-            Ok::<_, Raised>(Self { headless, current })
+            let is_bound = is_streamed || headless.backend() == Backend::Gpu;
+            let bound_to = is_bound.then(std::process::id);
+            Ok::<_, Raised>(Self { headless, current, bound_to })
         })?;
         Ok(view)
     }
 
     /// Changes the scene. Only what depends on the change is computed again.
     fn set_scene(&self, py: Python<'_>, scene: &Scene) -> PyResult<()> {
-        py.detach(|| {
+        detached(py, || {
+            self.check_process()?;
             let (mut current, start) = (self.lock(), Instant::now());
             self.headless.set_scene(&mut current.view, &scene.scene)?;
             current.size = size(scene);
@@ -79,7 +93,8 @@ impl View {
 
     /// Draws a picture.
     fn draw<'py>(&self, py: Python<'py>) -> PyResult<Drawn<'py>> {
-        let (rendering, stats) = py.detach(|| {
+        let (rendering, stats) = detached(py, || {
+            self.check_process()?;
             let mut current = self.lock();
             let mut rendering = self.headless.draw(&mut current.view).map_err(Raised::from)?;
             rendering.stats.prepare_ms = std::mem::take(&mut current.prepare_ms);
@@ -98,7 +113,8 @@ impl View {
         slabs: Option<(i32, i32)>,
         region: Option<(u32, u32, u32, u32)>,
     ) -> PyResult<(Part, String)> {
-        let (drawn, stats) = py.detach(|| {
+        let (drawn, stats) = detached(py, || {
+            self.check_process()?;
             let mut current = self.lock();
             let window = window(current.size, slabs, region);
             let (drawn, mut stats) = self.headless.draw_part(&mut current.view, &window).map_err(Raised::from)?;
@@ -124,6 +140,12 @@ type Entry = (Backend, Option<String>, Arc<Headless>);
 /// The backend for a scene. A GPU's device is opened once for each adapter's name.
 fn headless(backend: Backend, adapter: Option<String>, scene: &sheetsplat::Scene) -> Result<Arc<Headless>, Raised> {
     static OPENED: Mutex<Vec<Entry>> = Mutex::new(Vec::new());
+    // Devices do not survive a fork.
+    let backend = match backend {
+        Backend::Gpu if is_forked() => return Err(forked("backend \"gpu\"")),
+        Backend::Auto if is_forked() => Backend::Cpu,
+        backend => backend,
+    };
     let mut options = HeadlessOptions::default().with_backend(backend);
     options.adapter = adapter.clone();
     let is_automatic = backend == Backend::Auto;

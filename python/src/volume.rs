@@ -13,6 +13,7 @@ use sheetsplat::volume::{Labels, Orientation, ReadOptions, ValueSlice, Values};
 
 use crate::array;
 use crate::error::{self, Raised, setting};
+use crate::process::detached;
 use crate::scene::Scene;
 
 /// The name of volumes from arrays in errors.
@@ -124,7 +125,7 @@ impl Volume {
         let labels = labels.map(|labels| read_labels(labels, &bytes, limit)).transpose()?;
         let orientation =
             axes.map(|axes| Orientation { axes: DMat3::from_cols_array_2d(&axes), origin: origin.into() });
-        let volume = py.detach(|| {
+        let volume = detached(py, || {
             let channel = |(dims, values): ([u32; 3], Values)| {
                 sheetsplat::Volume::from_values(ORIGIN, dims.into(), zyx(spacing), values)
             };
@@ -172,10 +173,7 @@ impl Volume {
         for channel in &mut shown.further {
             (channel.volume, channel.spacing, channel.labels) = (VolumeSource::Memory, None, None);
         }
-        let volume = py.detach(|| {
-            let (volume, _) = shown.open_volume_and_files(&options)?;
-            replaced(volume, spacing, labels)
-        })?;
+        let volume = detached(py, || replaced(shown.open_volume_with(&options)?, spacing, labels))?;
         Ok(Self(volume))
     }
 
@@ -190,7 +188,7 @@ impl Volume {
     ) -> PyResult<Self> {
         let limit = reading(memory, None, None)?.memory_limit();
         let labels = labels.map(|labels| read_labels(labels, &self.value_bytes(), limit)).transpose()?;
-        Ok(Self(py.detach(|| replaced(self.0.clone(), spacing, labels))?))
+        Ok(Self(detached(py, || replaced(self.0.clone(), spacing, labels))?))
     }
 
     /// The number of voxels along z, y and x.
@@ -254,7 +252,7 @@ impl Volume {
     /// of the sample.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let volume = self.0.sample();
-        let ([min, max, mean], percentiles, suggested) = py.detach(|| {
+        let ([min, max, mean], percentiles, suggested) = detached(py, || {
             let shares = PERCENTILES.map(|(share, _)| share);
             (extent_and_mean(volume.values()), quantiles(volume.values(), |_| true, shares), Preset::suggested(volume))
         });

@@ -65,6 +65,19 @@ def test_arrays_paths_and_scenes(client: Client, tmp_path: pathlib.Path, monkeyp
         np.testing.assert_array_equal(np.asarray(drawn), expected)
 
 
+def test_arrays_of_dask_are_computed_by_the_cluster(client: Client) -> None:
+    array = pytest.importorskip("dask.array", reason="dask.array is not installed")
+    values = np.random.default_rng(5).normal(size=(32, 32, 32)).astype(np.float32)
+    labels = (values > 0).astype(np.uint8)
+    expected = in_one_process(values, 8, **LOOK)
+    for _ in range(3):
+        chunked = array.from_array(values, chunks=8) + 0
+        drawn = sheetsplat.dask.render(chunked, client=client, parts=8, **LOOK).result(timeout=120)
+        np.testing.assert_array_equal(np.asarray(drawn), expected)
+    drawn = sheetsplat.dask.render(values, labels=array.from_array(labels, chunks=16), client=client, parts=8, **LOOK)
+    np.testing.assert_array_equal(np.asarray(drawn.result(timeout=120)), in_one_process(values, 8, labels=labels, **LOOK))
+
+
 def test_scenes_are_pickled(tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
     np.save(tmp_path / "values.npy", np.zeros((4, 4, 4)))
     monkeypatch.chdir(tmp_path)

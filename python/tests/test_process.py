@@ -72,3 +72,50 @@ def test_renders_leak_nothing() -> None:
     draw(2000)
     # The pictures alone would take 125 MiB.
     assert resident_kib() - before < 5 * 1024
+
+
+FORK = """
+import multiprocessing, sys
+import numpy as np
+import sheetsplat
+
+LOOK = {"image": {"width": 40, "height": 30}}
+
+def draw(number):
+    values = np.random.default_rng(number).normal(size=(12, 12, 12))
+    return np.asarray(sheetsplat.render(values, **LOOK)).copy()
+
+def by_gpu(_):
+    try:
+        sheetsplat.render("builtin:head:8", backend="gpu", **LOOK)
+    except sheetsplat.DeviceError as error:
+        return str(error)
+    return "drawn"
+
+def by_auto(_):
+    return np.asarray(sheetsplat.render("builtin:head:8", backend="auto", **LOOK)).shape
+
+if __name__ == "__main__":
+    method, is_before = sys.argv[1], sys.argv[2] == "before"
+    if is_before:
+        draw(0)
+    with multiprocessing.get_context(method).Pool(2) as pool:
+        pictures = pool.map_async(draw, range(6)).get(100)
+        if method == "fork":
+            assert "forked process" in pool.apply_async(by_gpu, (0,)).get(100)
+            assert pool.apply_async(by_auto, (0,)).get(100) == (30, 40, 4)
+    for number, picture in enumerate(pictures):
+        assert (picture == draw(number)).all(), number
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no fork")
+@pytest.mark.parametrize("method", ["fork", "spawn", "forkserver"])
+@pytest.mark.parametrize("is_before", ["before", "after"])
+def test_processes_draw_the_same(method: str, is_before: str, tmp_path: pathlib.Path) -> None:
+    """However processes are started, before or after a first picture."""
+    script = tmp_path / "script.py"
+    script.write_text(FORK)
+    command = [sys.executable, "-X", "faulthandler", str(script), method, is_before]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=200)
+    assert result.returncode == 0, result.stderr

@@ -58,9 +58,14 @@ fn is_searched_in_perspective(search: SearchBounds, p: vec4f) -> bool {
         && p.z >= search.low.z && p.z <= search.high.z;
 }
 
+// The least reach of a kernel in sheet depth: where its Gaussian vanishes in f32, which may be closer than its radius.
+fn least_kernel_reach() -> f32 {
+    return frame.support / planes.step.w;
+}
+
 // The range of the frame's sheets whose far planes a kernel reaches, from the first to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
-    let reach = frame.support / planes.step.w - gather.depth_error;
+    let reach = least_kernel_reach() - gather.depth_error;
     let sheets = (p.z + vec2f(-reach, reach) - gather.near) / frame.slab_width;
     return vec2f(floor(sheets.x), ceil(sheets.y) - 1.0);
 }

@@ -25,6 +25,11 @@ fn cuts_rays() -> bool {
     return CUT;
 }
 
+// The least reach of a kernel in sheet depth.
+fn least_kernel_reach() -> f32 {
+    return select(frame.reach, 0.0, frame.kernel_per_depth == 0.0);
+}
+
 // The range of the frame's sheets that a kernel overlaps, from the first to the one after the last.
 fn overlapped_sheets(p: vec4f) -> vec2f {
     let sheets = (overlapped(p, gather.depth_error, PERSPECTIVE) - gather.near) / frame.slab_width;

@@ -34,7 +34,7 @@ fn search_bounds(is_start: bool) -> SearchBounds {
     let margin = sheet_group.half_box + BOX_SLACK;
     let far = sheet_group.near + f32(SHEETS) * frame.slab_width;
     let reach = frame.reach + gather.depth_error;
-    let least_reach = select(frame.reach, 0.0, frame.kernel_per_depth == 0.0) - 2.0 * gather.depth_error;
+    let least_reach = least_kernel_reach() - 2.0 * gather.depth_error;
     var depths = vec2f(sheet_group.near + FIRST_PLANE * frame.slab_width - reach, far + reach);
     if is_start && ORDER == FRONT_TO_BACK {
         depths.x = sheet_group.near + least_reach;

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::material::Material;
 use super::vector::{LANES, optical_depth, power};
+use crate::error::setting::scaled;
 use crate::settings::shading::{Light, MAX_SHADING, Shading};
 use crate::settings::splatting::Compositing;
 
@@ -62,7 +63,7 @@ impl Shader {
             is_enabled: shading.enabled,
             to_light: match shading.light {
                 Light::Headlight => None,
-                Light::Direction(direction) => Some(direction.normalize().as_vec3().to_array()),
+                Light::Direction(direction) => Some(scaled(direction).normalize().as_vec3().to_array()),
             },
             ambient: capped(shading.ambient),
             diffuse: capped(shading.diffuse),

@@ -6,10 +6,8 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use sheetsplat_volume::internals::identity::{folder, resolved};
 use tempfile::TempPath;
-
-/// The maximum number of chained symbolic links, as on Linux.
-const MAX_LINKS: usize = 40;
 
 /// The temporary files by name, which are removed when dropped. The lock is held while one is created, renamed or removed, so the
 /// holder of the lock sees all of them.
@@ -192,27 +190,6 @@ pub fn write(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let mut output = Target::of(path)?.create()?;
     output.write_all(bytes)?;
     Output::commit(vec![output]).map_err(|(_, error)| error)
-}
-
-/// The path with symbolic links in its last part followed, even if they lead to a file that does not exist.
-///
-/// # Errors
-/// If there are too many links, or one cannot be read.
-pub fn resolved(path: &Path) -> io::Result<PathBuf> {
-    let mut path = path.to_owned();
-    for _ in 0..MAX_LINKS {
-        match fs::symlink_metadata(&path) {
-            Ok(metadata) if metadata.is_symlink() => path = folder(&path).join(fs::read_link(&path)?),
-            Err(error) if error.kind() != ErrorKind::NotFound => return Err(error),
-            _ => return Ok(path),
-        }
-    }
-    Err(io::Error::other("too many symbolic links"))
-}
-
-/// The folder of a file.
-pub fn folder(path: &Path) -> &Path {
-    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Standard output or standard error, if that is the same file. A file that another program opened is written from its current position,

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use sheetsplat_volume::internals::{plain, plain_lines};
+
 use crate::error::setting::Allowed;
 use crate::volume::VolumeError;
 
@@ -10,7 +12,7 @@ use crate::volume::VolumeError;
 #[non_exhaustive]
 pub enum SceneError {
     /// The scene file could not be opened or read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", plain(&path.to_string_lossy()))]
     #[non_exhaustive]
     Io {
         /// The scene file.
@@ -19,7 +21,7 @@ pub enum SceneError {
         source: std::io::Error,
     },
     /// The scene file is not TOML.
-    #[error("{origin}: {message}")]
+    #[error("{}: {}", plain(origin), plain_lines(message))]
     #[non_exhaustive]
     Syntax {
         /// The scene file.
@@ -28,7 +30,7 @@ pub enum SceneError {
         message: String,
     },
     /// A key is unknown or missing, or its value has the wrong type or is out of range.
-    #[error("{origin}: {key}: found {found}, allowed: {allowed}")]
+    #[error("{}: {}: found {}, allowed: {}", plain(origin), plain(key), plain(found), plain(&allowed.to_string()))]
     #[non_exhaustive]
     Invalid {
         /// The scene file, or `--set` if the value came from an override.

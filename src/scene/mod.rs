@@ -17,7 +17,7 @@ mod tables;
 mod transfer_settings;
 mod writer;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use toml::Table;
@@ -103,24 +103,13 @@ impl Scene {
         self.load_volume_with(&ReadOptions::default())
     }
 
-    /// Like [`Self::load_volume`], with a folder that files must lie in and a memory limit for values and labels together.
+    /// Like [`Self::load_volume`], with a folder that files must lie in, a memory limit for values and labels together, and files that are outputs.
     ///
     /// # Errors
-    /// As for [`Self::load_volume`], and if a file lies outside the folder.
+    /// As for [`Self::load_volume`], and if a file lies outside the folder or is an output.
     pub fn load_volume_with(&self, options: &ReadOptions) -> Result<Volume, VolumeError> {
-        self.load_volume_and_files(options).map(|(volume, _)| volume)
-    }
-
-    /// Like [`Self::load_volume_with`]. Also returns the files that the volume and its labels were read from, including slices in a folder
-    /// and data files that a header names.
-    ///
-    /// # Errors
-    /// As for [`Self::load_volume_with`].
-    pub fn load_volume_and_files(&self, options: &ReadOptions) -> Result<(Volume, Vec<PathBuf>), VolumeError> {
         let scene = self.choose_levels(options, Self::explicit)?;
-        let access = Access::new(options)?;
-        let volume = load::channels(&scene, &access)?;
-        Ok((volume, access.files()))
+        load::channels(&scene, &Access::new(options)?)
     }
 
     /// Opens the scene's volume to be read by boxes (SPEC §13), if it is one file without labels or a spacing of the scene's; `None` for any other.

@@ -1,6 +1,5 @@
 //! Opening a scene's volume: in memory, or where it fits into none, to be read while it is drawn.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use glam::UVec3;
@@ -84,23 +83,22 @@ impl Scene {
     /// # Errors
     /// As for [`Self::load_volume`].
     pub fn open_volume(&self) -> Result<OpenVolume, VolumeError> {
-        self.open_volume_and_files(&ReadOptions::default()).map(|(volume, _)| volume)
+        self.open_volume_with(&ReadOptions::default())
     }
 
-    /// Like [`Self::open_volume`], with the options of [`Self::load_volume_with`], and the files of [`Self::load_volume_and_files`].
+    /// Like [`Self::open_volume`], with the options of [`Self::load_volume_with`].
     ///
     /// # Errors
     /// As for [`Self::load_volume_with`].
-    pub fn open_volume_and_files(&self, options: &ReadOptions) -> Result<(OpenVolume, Vec<PathBuf>), VolumeError> {
+    pub fn open_volume_with(&self, options: &ReadOptions) -> Result<OpenVolume, VolumeError> {
         let scene = self.choose_levels(options, Self::explicit)?;
         let access = Access::new(options)?;
         if let Some(volume) = streamed(&scene, options, &access)? {
-            return Ok((volume.into(), access.files()));
+            return Ok(volume.into());
         }
         // What the store reserved is free again.
         let access = Access::new(options)?;
-        let volume = load::channels(&scene, &access)?;
-        Ok((volume.into(), access.files()))
+        Ok(load::channels(&scene, &access)?.into())
     }
 
     /// Checks that the scene can show a volume that is read while it is drawn: with image-aligned sheets, and interpolated as they are. The sample must have

@@ -73,3 +73,15 @@ fn combinations<const N: usize>(counts: [usize; N]) -> Vec<[usize; N]> {
     };
     (0..counts.iter().product()).map(row).collect()
 }
+
+#[test]
+fn rows_hold_every_pair() {
+    let counts = [7, 3, 2, 2];
+    let rows = pairs(counts);
+    for (second, first) in (1..4).flat_map(|second| (0..second).map(move |first| (second, first))) {
+        for (a, b) in (0..counts[first]).flat_map(|a| (0..counts[second]).map(move |b| (a, b))) {
+            assert!(rows.iter().any(|row| row[first] == a && row[second] == b), "{first}: {a}, {second}: {b}");
+        }
+    }
+    assert!(every_case() || rows.len() <= 24, "{} rows", rows.len());
+}

@@ -1,10 +1,13 @@
 //! Scenes of a view that change, by every backend.
 
+use glam::DVec3;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
 use sheetsplat::scene::Scene;
+use sheetsplat::settings::Light;
 use sheetsplat::volume::builtin;
 
-use crate::common::images::bits;
+use crate::common::compare::assert_at_most;
+use crate::common::images::{bits, largest_difference};
 use crate::common::{scene, transfer};
 
 #[test]
@@ -32,4 +35,29 @@ fn views_of_every_backend_change_their_scenes() {
     let mut of_cpu = cpu.view(volume, &first).unwrap();
     let message = gpu.set_scene(&mut of_cpu, &other).unwrap_err().to_string();
     assert!(message.contains("cpu") && message.contains("gpu"), "{message}");
+}
+
+/// Directions have any length that numbers have.
+#[test]
+fn directions_have_any_length() {
+    let volume = std::sync::Arc::new(builtin::volume("head:12").unwrap());
+    let headless = [Backend::Gpu, Backend::Cpu, Backend::Reference]
+        .map(|backend| Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap());
+    let scene = |length: f64| {
+        let mut scene = scene(24, 24);
+        scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
+        scene.camera.direction = DVec3::new(0.4, 0.9, -0.3) * length;
+        scene.camera.up = DVec3::Z * length;
+        scene.shading.light = Light::Direction(DVec3::new(0.5, -0.7, 0.6) * length);
+        scene
+    };
+    for headless in &headless {
+        let image = |length| headless.render_volume(volume.clone(), &scene(length)).unwrap().image;
+        let unit = image(1.0);
+        assert!(unit.pixels.iter().any(|pixel| pixel[0] > 0.2), "{:?}", headless.backend());
+        for length in [1e-200, 1e-20, 1e20, 1e200] {
+            let difference = largest_difference(&unit, &image(length));
+            assert_at_most(difference, 1e-5, format_args!("{:?}, {length}", headless.backend()));
+        }
+    }
 }

@@ -187,3 +187,37 @@ fn without_a_driver_the_error_says_what_to_install() {
     run.assert_failure(1, &["no GPU adapter", "actual: none", "install", "lavapipe"]);
     assert!(folder.names().is_empty());
 }
+
+/// Names and texts of files reach the terminal with their control characters escaped: in errors, warnings, and what `info` tells.
+#[test]
+fn terminals_obey_no_file() {
+    let folder = Folder::new();
+    let nrrd = |fields: &str| {
+        format!(
+            "NRRD0005\ntype: uint8\ndimension: 3\nsizes: 2 2 2\nencoding: raw\n{fields}\n\n\u{1}\u{2}\u{3}\u{4}\u{5}\u{6}\u{7}\u{8}"
+        )
+    };
+    let spaces = "space dimension: 3\nspace directions: (1,0,0) (0,1,0) (0,0,1)\nspace units: \"mm\u{1b}[2J\" \"mm\u{1b}[2J\" \"mm\u{1b}[2J\"";
+    folder.write("unit.nrrd", nrrd(spaces));
+    folder.write("field.nrrd", nrrd("thick\u{1b}ness: 3\nsizes: 2\u{1b} 2 2"));
+    folder.write("data.nhdr", nrrd("data file: gone\u{1b}[31m.raw"));
+    folder.write("syntax.toml", "volume.path = 'a.nrrd'\ncamera = \u{1b}[31m\n");
+    folder.write("key.toml", "volume.path = 'a.nrrd'\n\"cam\\u001bera\" = 3\n");
+    folder.write("value.toml", "volume.path = 'a.nrrd'\nsplatting.order = \"front\\u001b\\nsheetsplat: forged\"\n");
+    folder.write("path.toml", "volume.path = \"gone\\u001b[31m.nrrd\"\n");
+    folder.write("long.toml", format!("volume.path = \"{}\"\n", "gone".repeat(1 << 18)));
+    for name in
+        ["unit.nrrd", "field.nrrd", "data.nhdr", "syntax.toml", "key.toml", "value.toml", "path.toml", "long.toml"]
+    {
+        for arguments in
+            [format!("info {name}"), format!("info {name} --json"), format!("render {name} -o a.png --backend cpu")]
+        {
+            let Run { stdout, stderr, .. } = folder.run(&arguments);
+            for text in [&stdout, &stderr] {
+                assert!(!text.contains(|c: char| c.is_control() && c != '\n'), "{arguments}: {text:?}");
+                assert!(text.len() < 8000, "{arguments}: {} bytes", text.len());
+                assert!(!text.lines().any(|line| line == "sheetsplat: forged"), "{arguments}: {text:?}");
+            }
+        }
+    }
+}

@@ -87,6 +87,16 @@ fn no_output_is_an_input() {
     ] {
         assert_refused(&folder, &format!("{arguments} {NO_DEVICE}"), &[option, "the input", input], input);
     }
+    for (file, input) in [
+        ("a.nhdr", "a.nhdr"),
+        ("a.nhdr", "nrrd.raw"),
+        ("a.mhd", "here/meta.raw"),
+        ("a.npy", "a.npy"),
+        ("pair.hdr", "pair.img"),
+        ("pair.img", "pair.hdr"),
+    ] {
+        assert_refused(&folder, &format!("index {file} -o {input}"), &["--output", "the input"], input);
+    }
     assert_refused(&folder, "compare image.png image.png --difference here/image.png", &["--difference"], "image.png");
     // Other files beside the slices may be written.
     folder.render("series -o series/a.png --set image={width=8,height=8}");
@@ -114,6 +124,47 @@ fn an_input_by_another_name_is_no_output() {
     assert_refused(&folder, "compare image.png image.png --difference soft.png", &["--difference"], "image.png");
 }
 
+/// Whatever lies in a store's folder is an input, also what is not there yet.
+#[test]
+fn no_output_lies_in_a_store() {
+    let folder = Folder::new();
+    fs::create_dir_all(folder.path("v.zarr/0")).unwrap();
+    let multiscales = r#"{"multiscales": [{"version": "0.4", "datasets": [{"path": "0", "coordinateTransformations": [{"type": "scale",
+        "scale": [1, 1, 1]}]}], "axes": [{"name": "z", "type": "space"}, {"name": "y", "type": "space"}, {"name": "x", "type": "space"}]}]}"#;
+    let array = r#"{"zarr_format": 2, "shape": [4, 2, 2], "chunks": [2, 2, 2], "dtype": "|u1", "compressor": null, "fill_value": 0,
+        "order": "C", "filters": null}"#;
+    folder.write("v.zarr/.zgroup", r#"{"zarr_format": 2}"#);
+    folder.write("v.zarr/.zattrs", multiscales);
+    folder.write("v.zarr/0/.zarray", array);
+    folder.write("v.zarr/0/0.0.0", [1, 2, 3, 4, 5, 6, 7, 8]);
+    folder.write("notes", "kept");
+    symlink("v.zarr", folder.path("soft.zarr")).unwrap();
+    symlink("v.zarr/0/0.0.0", folder.path("soft")).unwrap();
+    symlink("../../notes", folder.path("v.zarr/0/notes")).unwrap();
+    fs::hard_link(folder.path("v.zarr/0/0.0.0"), folder.path("hard")).unwrap();
+    fs::hard_link(folder.path("v.zarr/.zattrs"), folder.path("attributes")).unwrap();
+    let kept = ["v.zarr/.zgroup", "v.zarr/.zattrs", "v.zarr/0/.zarray", "v.zarr/0/0.0.0", "notes"];
+    for output in
+        kept.into_iter().chain(["soft", "hard", "attributes", "v.zarr/0/notes", "v.zarr/0/1.0.0", "v.zarr/new"])
+    {
+        for store in ["v.zarr", "soft.zarr"] {
+            let before = kept.map(|name| folder.read(name));
+            for arguments in [
+                format!("index {store} -o {output}"),
+                format!("render {store} -o a.png --stats {output} {NO_DEVICE}"),
+                format!("render {store} -o a.png --save-scene s.toml --stats {output} {NO_DEVICE}"),
+            ] {
+                let words = ["the input that --", output, "would replace", "allowed: another file"];
+                folder.run(&arguments).assert_failure(2, &words);
+                assert_eq!(kept.map(|name| folder.read(name)), before, "{arguments}");
+                let is_new = |name: &str| folder.path(name).exists();
+                assert!(!is_new("v.zarr/0/1.0.0") && !is_new("v.zarr/new") && !is_new("a.png"), "{arguments}");
+            }
+        }
+    }
+    folder.run("index v.zarr -o v.index").assert_success();
+}
+
 #[test]
 fn two_outputs_are_two_files() {
     let folder = with_inputs();
@@ -121,11 +172,11 @@ fn two_outputs_are_two_files() {
     symlink("old.png", folder.path("soft")).unwrap();
     symlink("new.png", folder.path("dangling")).unwrap();
     for arguments in ["-o old.png --stats soft", "-o old.png --stats here/old.png", "-o new.png --stats dangling"] {
-        let words = ["--stats", "the file of --output"];
+        let words = ["--stats", "the same file as --output"];
         assert_refused(&folder, &format!("render a.nrrd {arguments} {NO_DEVICE}"), &words, "old.png");
     }
     let twice = "-o old.png --stats s.toml --save-scene here/s.toml";
-    let words = ["--save-scene", "s.toml", "the file of --stats"];
+    let words = ["--save-scene", "s.toml", "the same file as --stats"];
     assert_refused(&folder, &format!("render a.nrrd {twice} {NO_DEVICE}"), &words, "old.png");
     let frames = "orbit a.nrrd -o soft-%d.png --count 2 --overwrite";
     symlink("soft-1.png", folder.path("soft-0.png")).unwrap();

@@ -49,7 +49,7 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
         .assert_failure(2, &["other.index: identity: found 0, allowed: ", "that of the store"]);
     folder
         .run(&format!("index {ball} -o ball.raw"))
-        .assert_failure(2, &["--output: found ball.raw, which is also the input"]);
+        .assert_failure(2, &["--output ball.raw: found the same file as the input"]);
     folder
         .run(&format!("index {ball} --index ball.index -o no.index"))
         .assert_failure(2, &["--index: found an index for the store, allowed: --output"]);

@@ -1,12 +1,11 @@
 //! Limits on reading: which files may be opened, and how much memory their values may use.
 
 use std::borrow::Cow;
-use std::collections::BTreeSet;
 use std::fmt::{self, Debug, Display, Formatter};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, PoisonError};
 
 use super::VolumeError;
 use super::address;
@@ -14,6 +13,7 @@ use super::error::volume::{invalid, io_error};
 use super::file::{BytesRead, Files};
 use super::located::{Located, Notes};
 use super::memory;
+use super::outputs::Outputs;
 use super::series::Selection;
 
 /// Options for reading volumes, labels and scenes. By default files may lie anywhere.
@@ -45,6 +45,8 @@ pub struct ReadOptions {
     pub files: Option<Files>,
     /// The counter of bytes read, for programs that show progress.
     pub bytes_read: Option<BytesRead>,
+    /// The files that will be written, which may not be read.
+    pub outputs: Outputs,
 }
 
 impl ReadOptions {
@@ -111,6 +113,11 @@ impl ReadOptions {
         memory::parse_size(text)
     }
 
+    /// These options with files that will be written, which may not be read.
+    pub fn with_outputs(self, outputs: Outputs) -> Self {
+        Self { outputs, ..self }
+    }
+
     /// These options with another memory limit in bytes.
     pub fn with_memory(self, bytes: u64) -> Self {
         Self { memory: Some(bytes), ..self }
@@ -127,7 +134,7 @@ struct Inner {
     limit: u64,
     reserved: AtomicU64,
     bytes_read: Option<BytesRead>,
-    files: Mutex<BTreeSet<PathBuf>>,
+    outputs: Outputs,
 }
 
 /// The folder to which files are confined.
@@ -148,7 +155,7 @@ impl Access {
         let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
         let limit = options.memory_limit();
         let (reserved, bytes_read) = (AtomicU64::new(0), options.bytes_read.clone());
-        let inner = Inner { given, folder, limit, reserved, bytes_read, files: Mutex::default() };
+        let inner = Inner { given, folder, limit, reserved, bytes_read, outputs: options.outputs.clone() };
         Ok(Self(
             Arc::new(inner),
             Selection { channel: options.channel, time: options.time, level: options.level },
@@ -261,19 +268,28 @@ impl Access {
         };
         match self.given() {
             Some(files) => Ok(files.get(path).and_then(utf8)),
-            None => Ok(std::fs::read_to_string(self.resolve(path)?)),
+            None => {
+                self.check_input(path)?;
+                Ok(std::fs::read_to_string(self.resolve(path)?))
+            }
         }
     }
 
-    /// Notes that a file is opened, not only to determine its format.
-    pub(super) fn note_open(&self, path: &Path) {
-        self.0.files.lock().unwrap_or_else(PoisonError::into_inner).insert(path.to_owned());
+    /// Checks that a file is not one that will be written.
+    ///
+    /// # Errors
+    /// If it is.
+    #[doc(hidden)]
+    pub fn check_input(&self, path: &Path) -> Result<(), VolumeError> {
+        self.0.outputs.at(path).map_or(Ok(()), |output| Err(would_be_lost(path, output)))
     }
 
-    /// The files opened so far, without those of which only the format was determined.
-    #[doc(hidden)]
-    pub fn files(&self) -> Vec<PathBuf> {
-        self.0.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+    /// Checks that none of the files in a folder, or in those below it, will be written.
+    ///
+    /// # Errors
+    /// If one will.
+    pub(super) fn check_folder(&self, path: &Path) -> Result<(), VolumeError> {
+        self.0.outputs.within(path).map_or(Ok(()), |output| Err(would_be_lost(path, output)))
     }
 
     /// The number of bytes of memory that are left.
@@ -295,6 +311,10 @@ impl Access {
         let allowed = format!("at most the memory limit of {limit} bytes{others}");
         Err(invalid(path, field, format!("{found}, which take {bytes} bytes of memory"), allowed))
     }
+}
+
+fn would_be_lost(path: &Path, output: &str) -> VolumeError {
+    invalid(path, "file", format!("the input that {output} would replace"), "another file to write")
 }
 
 impl Debug for Access {

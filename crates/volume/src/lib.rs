@@ -31,6 +31,7 @@ mod folder;
 mod format;
 mod grid;
 mod head;
+mod identity;
 mod index;
 mod labels;
 mod loaded;
@@ -50,6 +51,7 @@ mod nrrd;
 mod numbers;
 mod open;
 mod orientation;
+mod outputs;
 pub mod parallel;
 pub mod range;
 mod raw;
@@ -96,6 +98,7 @@ pub use index::{IndexedStore, StoreIndex};
 pub use labels::Labels;
 pub use open::open_store;
 pub use orientation::{Orientation, PatientSide};
+pub use outputs::Outputs;
 pub use raw::{RawLayout, open_raw_store};
 pub use sample::sample;
 pub use sample_type::SampleType;
@@ -118,6 +121,10 @@ pub mod internals {
     pub use crate::format::levels;
     pub use crate::grid::{SIZES, dims_of};
     pub use crate::grid::{SPACING, check_spacing};
+    /// Files, whatever names lead to them.
+    pub mod identity {
+        pub use crate::identity::{folder, resolved};
+    }
     pub use crate::labels::labels_of;
     #[cfg(feature = "npy")]
     pub use crate::npy;
@@ -132,5 +139,6 @@ pub mod internals {
     pub use crate::series::Selection;
     pub use crate::streamed::{check_grids, sample_of_channels};
     pub use crate::texel::COLOR_BYTES;
+    pub use crate::text::{plain, plain_lines};
     pub use crate::volume::HollowChannel;
 }

@@ -19,9 +19,8 @@ pub(super) const CHUNK: u64 = 64 << 10;
 
 impl Access {
     pub(super) fn open(&self, path: &Path) -> Result<Source, VolumeError> {
-        let source = self.open_to_look(path)?;
-        self.note_open(path);
-        Ok(source)
+        self.check_input(path)?;
+        self.open_to_look(path)
     }
 
     /// Opens a file only to determine its format.

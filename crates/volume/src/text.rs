@@ -1,6 +1,47 @@
 //! Numbers and vectors in headers, and text from files as errors show it.
 
+use std::fmt::{self, Display, Formatter, Write};
+
 use glam::DVec3;
+
+/// The number of characters that a message shows of a text.
+const MOST_SHOWN: usize = 1000;
+
+/// Text as messages show it: on one line, without characters that a terminal obeys or that reverse what follows, and cut after 1000 characters. What
+/// comes from files passes through here on its way out.
+pub fn plain(text: &str) -> Plain<'_> {
+    Plain { text, has_lines: false }
+}
+
+/// As [`plain`], for texts of several lines of any length.
+pub fn plain_lines(text: &str) -> Plain<'_> {
+    Plain { text, has_lines: true }
+}
+
+/// A text that is written with escapes.
+#[derive(Clone, Copy, Debug)]
+pub struct Plain<'a> {
+    text: &'a str,
+    has_lines: bool,
+}
+
+impl Display for Plain<'_> {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        for (at, character) in self.text.chars().enumerate() {
+            if at == MOST_SHOWN && !self.has_lines {
+                return f.write_str("…");
+            }
+            let is_format =
+                matches!(character, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+            if (character.is_control() || is_format) && !(self.has_lines && character == '\n') {
+                Display::fmt(&character.escape_default(), f)?;
+            } else {
+                f.write_char(character)?;
+            }
+        }
+        Ok(())
+    }
+}
 
 /// Text from a file, shortened and on one line.
 pub(super) fn shown(text: &str) -> String {
@@ -25,4 +66,17 @@ pub(super) fn number(text: &str) -> Option<f64> {
 pub(super) fn vector(text: &str) -> Option<DVec3> {
     let components = text.trim().strip_prefix('(')?.strip_suffix(')')?;
     three(components.split(',').map(number)).map(DVec3::from_array)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn terminals_obey_no_text_of_files() {
+        assert_eq!(plain("a\u{1b}[2J\nb\u{9b}\u{202e}é").to_string(), "a\\u{1b}[2J\\nb\\u{9b}\\u{202e}é");
+        assert_eq!(plain_lines("a\u{7}\nb\r").to_string(), "a\\u{7}\nb\\r");
+        let long = "x".repeat(1 << 20);
+        assert_eq!(plain(&long).to_string(), format!("{}…", &long[..1000]));
+    }
 }

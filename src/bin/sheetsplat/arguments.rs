@@ -232,9 +232,8 @@ impl Input {
     #[cfg(feature = "viewer")]
     pub(crate) fn load_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<Volume, Failure> {
         let start = Instant::now();
-        let loaded = scene.load_volume_and_files(&self.options());
-        let (volume, files) = loaded.map_err(|error| self.failure(error))?;
-        outputs.refuse(&files)?;
+        let loaded = scene.load_volume_with(&self.options().with_outputs(outputs.written()));
+        let volume = loaded.map_err(|error| self.failure(error))?;
         self.log_volume(&volume, start);
         Ok(volume)
     }
@@ -253,10 +252,8 @@ impl Input {
 
     /// Opens the volume without logging anything.
     pub(crate) fn read_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<OpenVolume, Failure> {
-        let opened = scene.open_volume_and_files(&self.options());
-        let (volume, files) = opened.map_err(|error| self.failure(error))?;
-        outputs.refuse(&files)?;
-        Ok(volume)
+        let options = self.options().with_outputs(outputs.written());
+        scene.open_volume_with(&options).map_err(|error| self.failure(error))
     }
 
     /// The scene as it is drawn, with everything stated that depends on the volume, so that a saved scene equals the drawn one. `explicit`

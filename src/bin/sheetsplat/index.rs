@@ -31,8 +31,8 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         ));
     }
     let scene = input.scene()?;
-    Outputs::check(&[("--output", output)], false, &input.files(&scene))?;
-    let store = scene.open_store(&input.options()).ok_or_else(|| {
+    let outputs = Outputs::check(&[("--output", output)], false, &input.files(&scene))?;
+    let store = scene.open_store(&input.options().with_outputs(outputs.written())).ok_or_else(|| {
         let allowed = "one file without labels";
         Failure::Input(format!("{}: found a volume that is not read by boxes, allowed: {allowed}", input.name))
     })?;

@@ -1,9 +1,11 @@
 //! The program's log on standard error: what `env_logger` writes, and the library's progress as a line on the terminal.
 
+use std::fmt;
 use std::io::{IsTerminal, Write, stderr};
 
 use log::{LevelFilter, Log, Metadata, Record};
 use sheetsplat::internals::after::coefficients::PROGRESS;
+use sheetsplat::internals::{plain, plain_lines};
 
 /// The log. Progress that the written log does not show is a line that every step rewrites and that disappears at the end.
 struct ProgramLog {
@@ -38,7 +40,15 @@ impl Log for ProgramLog {
             // A closed terminal does not end the program.
             let _ = stderr().lock().write_all(line(&record.args().to_string()).as_bytes());
         } else {
-            self.written.log(record);
+            // Names in files come into warnings.
+            let message = record.args().to_string();
+            let is_ours = record.target().starts_with("sheetsplat");
+            let message = if is_ours { plain(&message) } else { plain_lines(&message) };
+            let (level, target, module) = (record.level(), record.target(), record.module_path());
+            let written = |args: fmt::Arguments<'_>| {
+                self.written.log(&Record::builder().args(args).level(level).target(target).module_path(module).build());
+            };
+            written(format_args!("{message}"));
         }
     }
 

@@ -31,6 +31,7 @@ use std::process::ExitCode;
 use clap::{CommandFactory, Parser, Subcommand};
 
 use failure::Failure;
+use sheetsplat::internals::plain_lines;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -116,7 +117,7 @@ fn main() -> ExitCode {
     };
     let Err(failure) = result else { return ExitCode::SUCCESS };
     // Standard error may be closed.
-    let _ = writeln!(std::io::stderr(), "sheetsplat: {}", failure.message());
+    let _ = writeln!(std::io::stderr(), "sheetsplat: {}", plain_lines(failure.message()));
     match failure {
         Failure::Input(_) => ExitCode::from(2),
         Failure::Other(_) => ExitCode::FAILURE,

@@ -1,11 +1,11 @@
 //! Output files: none is an input, none is written twice, and either all are written or none.
 
-use std::collections::HashMap;
 use std::fs;
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use sheetsplat::image::output::{Output, Target, folder, resolved};
+use sheetsplat::image::output::{Output, Target};
+use sheetsplat::volume;
 
 use crate::failure::Failure;
 use crate::stdout::stdout;
@@ -13,12 +13,12 @@ use crate::stdout::stdout;
 /// A file to be written: the option that names it, and its path.
 pub(crate) type Named<'a> = (&'static str, &'a Path);
 
-/// The files that a run will write, including standard output if it prints, each with the option that names it and its path.
-pub(crate) struct Outputs(HashMap<Identity, (&'static str, String)>);
+/// The files that a run will write, including standard output if it prints.
+pub(crate) struct Outputs(volume::Outputs);
 
 impl Outputs {
-    /// Checks, before anything is drawn, that every file is writable, and that none equals another one or an input that is named so far.
-    /// [`Outputs::refuse`] checks the remaining inputs.
+    /// Checks, before anything is drawn, that every file is writable, and that none equals another one or an input that is named so far. Readers
+    /// are told of [`Outputs::written`], and refuse the remaining inputs.
     pub(crate) fn check(files: &[Named<'_>], prints: bool, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let outputs = Self::distinct(files.iter().map(|&(option, path)| (option, path.to_owned())), prints)?;
         outputs.refuse(inputs)?;
@@ -29,37 +29,36 @@ impl Outputs {
     /// Checks that no two paths lead to the same file.
     pub(crate) fn distinct(
         files: impl Iterator<Item = (&'static str, PathBuf)>,
-        prints: bool,
+        #[cfg_attr(not(unix), expect(unused_variables, reason = "standard output has no identity"))] prints: bool,
     ) -> Result<Self, Failure> {
-        let mut outputs = HashMap::new();
-        if prints && let Some(identity) = Identity::of_standard_output() {
-            outputs.insert(identity, ("standard output", "a file".to_owned()));
+        let mut outputs = volume::Outputs::default();
+        #[cfg(unix)]
+        if prints && let Some(file) = standard_output() {
+            outputs.insert_open(&file, "standard output").map_err(Failure::Other)?;
         }
         for (option, path) in files {
-            // A path that leads nowhere is reported when it is written.
-            let Ok(identity) = Identity::of(&path) else { continue };
-            let found = path.display().to_string();
-            if let Some((other, _)) = outputs.get(&identity) {
-                return Err(invalid(option, &found, &format!("the file of {other}")));
-            }
-            outputs.insert(identity, (option, found));
+            let name = format!("{option} {}", path.display());
+            outputs.insert(&path, &name).map_err(|other| invalid(&name, &other))?;
         }
         Ok(Self(outputs))
     }
 
     /// Refuses outputs that equal one of these inputs.
     pub(crate) fn refuse(&self, inputs: &[PathBuf]) -> Result<(), Failure> {
-        for input in inputs {
-            if let Some((option, found)) = Identity::of(input).ok().and_then(|identity| self.0.get(&identity)) {
-                return Err(invalid(option, found, &format!("the input {}", input.display())));
-            }
+        match inputs.iter().find_map(|input| self.0.at(input).map(|name| (name, input))) {
+            Some((name, input)) => Err(invalid(name, &format!("the input {}", input.display()))),
+            None => Ok(()),
         }
-        Ok(())
+    }
+
+    /// What readers must not read.
+    pub(crate) fn written(&self) -> volume::Outputs {
+        self.0.clone()
     }
 }
 
-fn invalid(option: &str, found: &str, other: &str) -> Failure {
-    Failure::Input(format!("{option}: found {found}, which is also {other}, allowed: another file"))
+fn invalid(name: &str, other: &str) -> Failure {
+    Failure::Input(format!("{name}: found the same file as {other}, allowed: another file"))
 }
 
 /// Checks that a path is writable.
@@ -102,49 +101,11 @@ pub(crate) fn failed(path: &Path) -> impl Fn(io::Error) -> Failure {
     }
 }
 
-/// The identity of a file, independent of its name.
-#[derive(PartialEq, Eq, Hash)]
-enum Identity {
-    /// Its device and inode.
-    #[cfg(unix)]
-    Inode(u64, u64),
-    /// The path at which the file is, or will be.
-    Path(PathBuf),
-}
-
-impl Identity {
-    fn of(path: &Path) -> io::Result<Self> {
-        match fs::metadata(path) {
-            Err(error) if error.kind() == ErrorKind::NotFound => {
-                let path = resolved(path)?;
-                let name = path.file_name().ok_or(ErrorKind::InvalidFilename)?;
-                Ok(Self::Path(fs::canonicalize(folder(&path))?.join(name)))
-            }
-            #[cfg(unix)]
-            metadata => metadata.map(|metadata| Self::of_file(&metadata)),
-            #[cfg(not(unix))]
-            metadata => metadata.and_then(|_| fs::canonicalize(path)).map(Self::Path),
-        }
-    }
-
-    #[cfg(unix)]
-    fn of_file(metadata: &fs::Metadata) -> Self {
-        use std::os::unix::fs::MetadataExt;
-        Self::Inode(metadata.dev(), metadata.ino())
-    }
-
-    /// The file or pipe connected to standard output; `None` for a terminal, which several outputs may share.
-    #[cfg(unix)]
-    fn of_standard_output() -> Option<Self> {
-        use std::os::fd::AsFd;
-        use std::os::unix::fs::FileTypeExt;
-        let file = fs::File::from(io::stdout().as_fd().try_clone_to_owned().ok()?);
-        let metadata = file.metadata().ok().filter(|metadata| !metadata.file_type().is_char_device())?;
-        Some(Self::of_file(&metadata))
-    }
-
-    #[cfg(not(unix))]
-    fn of_standard_output() -> Option<Self> {
-        None
-    }
+/// The file or pipe connected to standard output; `None` for a terminal, which several outputs may share.
+#[cfg(unix)]
+fn standard_output() -> Option<fs::Metadata> {
+    use std::os::fd::AsFd;
+    use std::os::unix::fs::FileTypeExt;
+    let file = fs::File::from(io::stdout().as_fd().try_clone_to_owned().ok()?);
+    file.metadata().ok().filter(|metadata| !metadata.file_type().is_char_device())
 }

@@ -112,7 +112,7 @@ fn spacings_of_scenes_are_streamed() {
     let values = (0..dims.element_product()).map(value).collect();
     write_nrrd(&path, &Volume::new("values", dims, glam::DVec3::ONE, values).unwrap());
     let scene = scene(&path, &["volume.spacing=[1,2,0.5]", "splatting.classification=before"]);
-    let open = |memory| scene.open_volume_and_files(&ReadOptions::default().with_memory(memory)).unwrap().0;
+    let open = |memory| scene.open_volume_with(&ReadOptions::default().with_memory(memory)).unwrap();
     let (streamed, whole) = with_one_thread(|| (open(8_500_000), open(1 << 30)));
     let OpenVolume::Whole(whole) = whole else { panic!("the volume is not in memory") };
     let OpenVolume::Streamed(streamed) = streamed else { panic!("the volume is in memory") };
@@ -140,7 +140,7 @@ fn stores_that_cannot_be_read_within_the_limit_are_streamed() {
             fs::write(path.join(format!("{z}.{y}.{x}")), chunk).unwrap();
         }
         let scene = scene(&path, &["splatting.classification=before"]);
-        let open = |memory| scene.open_volume_and_files(&ReadOptions::default().with_memory(memory)).unwrap().0;
+        let open = |memory| scene.open_volume_with(&ReadOptions::default().with_memory(memory)).unwrap();
         // A byte for each value are 256 KiB, and four are 1 MiB.
         let (within, whole) = with_one_thread(|| (open(700 << 10), open(1 << 30)));
         let OpenVolume::Whole(whole) = whole else { panic!("{thickness}: the volume is not in memory") };

@@ -112,11 +112,13 @@ type Change = fn(&mut Scene);
 #[test]
 fn settings_are_the_twins() {
     let gpu = gpu();
-    let cases: [(&str, Change); 14] = [
+    let cases: [(&str, Change); 15] = [
         ("thin", |scene| scene.splatting.slab_width = 0.3),
         ("thick", |scene| scene.splatting.slab_width = 3.0),
         ("radius 1.4", |scene| scene.splatting.radius = 1.4),
         ("radius 2.7", |scene| scene.splatting.radius = 2.7),
+        // Where the Gaussian vanishes within the radius.
+        ("radius 4", |scene| scene.splatting.radius = 4.0),
         ("falloff 3", |scene| scene.splatting.falloff = 3.0),
         ("minified", |scene| scene.camera = camera([0.4, 0.9, -0.3], 120.0)),
         ("back to front", |scene| scene.splatting.order = Order::BackToFront),

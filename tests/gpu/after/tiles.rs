@@ -31,7 +31,7 @@ fn random_case(random: &mut Random, has_eye: bool) -> (Volume, Scene) {
         scene.camera = random_eye(random, volume.grid());
     }
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 1.0, 1.7]);
-    scene.splatting.radius = random.pick(&[1.4, 2.0, 2.0, 2.7]);
+    scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7, 4.0]);
     scene.transfer = transfer(
         &[(0.0, [0.2, 0.3, 0.9]), (120.0, [0.9, 0.6, 0.1]), (250.0, [1.0, 0.9, 0.8])],
         &[(15.0, 0.0), (40.0, 0.1), (130.0, 0.05), (200.0, 0.7)],

@@ -6,9 +6,11 @@ use std::ops::{Bound, RangeBounds};
 
 use glam::DVec3;
 
+use crate::text::plain;
+
 /// A setting with an invalid value.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("{key}: found {found}, allowed: {allowed}")]
+#[error("{}: found {}, allowed: {}", plain(key), plain(&found.to_string()), plain(&allowed.to_string()))]
 #[non_exhaustive]
 pub struct SettingError {
     /// The scene file's key, with elements counted from 0 (`camera.up`, `transfer.opacity[2][1]`), or the name of a parameter that scene

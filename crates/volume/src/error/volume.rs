@@ -5,13 +5,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::setting::SettingError;
+use crate::text::plain;
 
 /// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum VolumeError {
     /// The file could not be opened or read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {source}", plain(&path.to_string_lossy()))]
     #[non_exhaustive]
     Io {
         /// The file.
@@ -20,7 +21,7 @@ pub enum VolumeError {
         source: std::io::Error,
     },
     /// A header field, or the data it promises, is invalid.
-    #[error("{origin}: {field}: found {found}, allowed: {allowed}")]
+    #[error("{}: {}: found {}, allowed: {}", plain(origin), plain(field), plain(found), plain(allowed))]
     #[non_exhaustive]
     Invalid {
         /// The file, or `builtin:NAME`.

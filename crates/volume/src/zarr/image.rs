@@ -89,6 +89,7 @@ impl Image {
         let keys = if access.is_address(path)? {
             Keys::of_address(path, access)?
         } else if access.is_folder(store)? {
+            access.check_folder(store)?;
             Keys::of_folder(path, access)
         } else {
             Keys::of_archive(store, inner.unwrap_or_default(), access)?

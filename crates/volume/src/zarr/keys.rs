@@ -97,10 +97,6 @@ impl Keys {
             let found = format!("{bytes} bytes");
             return Err(invalid(&self.file(key), "metadata", found, format!("at most {MAX_HEADER} bytes")));
         }
-        if matches!(self.place, Place::Folder) {
-            // The file is one of those that the volume consists of.
-            drop(self.access.open(&self.file(key))?);
-        }
         self.range(key, 0..bytes).map(Some)
     }
 
@@ -178,7 +174,7 @@ impl Keys {
             nearest.map(|nearest| self.access.resolve(nearest)).transpose()?;
             return Ok(None);
         }
-        match self.access.open_to_look(&path) {
+        match self.access.open(&path) {
             Ok(file) => Ok(Some(file)),
             Err(VolumeError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
             Err(error) => Err(error),

@@ -11,6 +11,7 @@ mod confined;
 mod data_files;
 mod dicom;
 mod dispatch;
+mod escapes;
 mod holes;
 #[cfg(feature = "http")]
 mod http;
