@@ -288,6 +288,7 @@ impl Access {
     ///
     /// # Errors
     /// If one will.
+    #[cfg(feature = "zarr")]
     pub(super) fn check_folder(&self, path: &Path) -> Result<(), VolumeError> {
         self.0.outputs.within(path).map_or(Ok(()), |output| Err(would_be_lost(path, output)))
     }

@@ -80,6 +80,7 @@ impl Outputs {
     }
 
     /// The name of an output that lies in a folder or one below it, or that a link there leads to.
+    #[cfg(feature = "zarr")]
     pub(super) fn within(&self, folder: &Path) -> Option<&str> {
         if self.0.is_empty() {
             return None;
@@ -95,6 +96,7 @@ impl Outputs {
     }
 
     /// The name of an output that a file in a folder, or in one below it, is too.
+    #[cfg(feature = "zarr")]
     fn linked(&self, folder: &Path) -> Option<&str> {
         fs::read_dir(folder).ok()?.flatten().find_map(|entry| {
             let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
