@@ -1,5 +1,5 @@
-//! How much of what could be drawn a test draws. Where every combination would take minutes, most of all to compile pipelines, `.ci/run` draws a
-//! part, and `.ci/run --all` everything: it sets `SHEETSPLAT_EVERY_CASE`.
+//! The number of cases that a test draws. Where every combination of settings would take minutes, most of all to compile pipelines, `.ci/run` draws
+//! some, and `.ci/run --all` draws all: it sets `SHEETSPLAT_EVERY_CASE`.
 
 use std::sync::LazyLock;
 
@@ -9,7 +9,7 @@ pub(crate) fn every_case() -> bool {
     *EVERY
 }
 
-/// How many random cases a test draws: a few, or all.
+/// The number of random cases that a test draws: a few, or all.
 pub(crate) fn cases(few: usize, all: usize) -> usize {
     if every_case() { all } else { few }
 }

@@ -1,9 +1,9 @@
-//! What tests share, one at a time.
+//! Devices and the like that one test after another uses.
 
 use std::sync::{Mutex, PoisonError};
 
-/// Things that stay until the process ends, one for each test that runs at once. A software driver compiles a device's pipelines on one core, and
-/// compiling them takes longer than most tests: so tests share devices, but those that run at once do not.
+/// Devices that stay until the process ends, as many as tests run at once. A software driver compiles a device's pipelines on one core, which takes
+/// longer than most tests: so a test takes the device of an earlier one, but never one that another test uses.
 pub(crate) struct Pool<T: 'static>(Mutex<Vec<&'static T>>);
 
 impl<T> Pool<T> {

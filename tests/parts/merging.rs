@@ -21,7 +21,7 @@ use crate::common::{COMPOSITINGS, scene};
 /// By how much a merged image may differ from the whole one (SPEC §11).
 const ALLOWED: f64 = 1e-6;
 
-/// What draws by a backend.
+/// The renderer of a backend.
 pub(crate) fn headless(backend: Backend) -> &'static Headless {
     static GPUS: Pool<Headless> = Pool::new();
     static CPU: LazyLock<Headless> = LazyLock::new(|| new(Backend::Cpu));

@@ -202,13 +202,22 @@ fn terminals_obey_no_file() {
     folder.write("field.nrrd", nrrd("thick\u{1b}ness: 3\nsizes: 2\u{1b} 2 2"));
     folder.write("data.nhdr", nrrd("data file: gone\u{1b}[31m.raw"));
     folder.write("syntax.toml", "volume.path = 'a.nrrd'\ncamera = \u{1b}[31m\n");
+    folder.write("line.toml", format!("volume.path = 'a.nrrd'\ncamera = {}\n", "x".repeat(1 << 20)));
     folder.write("key.toml", "volume.path = 'a.nrrd'\n\"cam\\u001bera\" = 3\n");
     folder.write("value.toml", "volume.path = 'a.nrrd'\nsplatting.order = \"front\\u001b\\nsheetsplat: forged\"\n");
     folder.write("path.toml", "volume.path = \"gone\\u001b[31m.nrrd\"\n");
     folder.write("long.toml", format!("volume.path = \"{}\"\n", "gone".repeat(1 << 18)));
-    for name in
-        ["unit.nrrd", "field.nrrd", "data.nhdr", "syntax.toml", "key.toml", "value.toml", "path.toml", "long.toml"]
-    {
+    for name in [
+        "unit.nrrd",
+        "field.nrrd",
+        "data.nhdr",
+        "syntax.toml",
+        "key.toml",
+        "value.toml",
+        "path.toml",
+        "line.toml",
+        "long.toml",
+    ] {
         for arguments in
             [format!("info {name}"), format!("info {name} --json"), format!("render {name} -o a.png --backend cpu")]
         {

@@ -139,6 +139,6 @@ pub mod internals {
     pub use crate::series::Selection;
     pub use crate::streamed::{check_grids, sample_of_channels};
     pub use crate::texel::COLOR_BYTES;
-    pub use crate::text::{plain, plain_lines};
+    pub use crate::text::{plain, plain_lines, plain_whole};
     pub use crate::volume::HollowChannel;
 }

@@ -90,17 +90,34 @@ impl Outputs {
         if let Some(output) = self.0.values().find(is_within) {
             return Some(&output.name);
         }
-        // Only a file that exists has other names.
-        self.0.values().any(|output| output.place.as_ref().is_some_and(|place| place.exists())).then_some(())?;
-        self.linked(&root)
+        // Only a file that exists has other names, and few have more than one of their own.
+        let existing = self.0.values().filter_map(|output| fs::metadata(output.place.as_ref()?).ok());
+        let has_names: Vec<bool> = existing.map(|metadata| has_further_names(&metadata)).collect();
+        if has_names.is_empty() { None } else { self.linked(&root, has_names.contains(&true)) }
     }
 
-    /// The name of an output that a file in a folder, or in one below it, is too.
+    /// The name of an output that a file in a folder, or in one below it, is too: a symbolic link, or any file if an output has further names. To list a
+    /// folder costs little, but to look at each of its files would take minutes where a store has many chunks.
     #[cfg(feature = "zarr")]
-    fn linked(&self, folder: &Path) -> Option<&str> {
+    fn linked(&self, folder: &Path, has_further_names: bool) -> Option<&str> {
         fs::read_dir(folder).ok()?.flatten().find_map(|entry| {
-            let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
-            if is_folder { self.linked(&entry.path()) } else { self.at(&entry.path()) }
+            let kind = entry.file_type().ok()?;
+            if kind.is_dir() {
+                self.linked(&entry.path(), has_further_names)
+            } else if kind.is_symlink() || has_further_names {
+                self.at(&entry.path())
+            } else {
+                None
+            }
         })
     }
+}
+
+/// Whether a file may have another name of its own (a hard link).
+#[cfg(feature = "zarr")]
+fn has_further_names(file: &fs::Metadata) -> bool {
+    #[cfg(unix)]
+    return std::os::unix::fs::MetadataExt::nlink(file) > 1;
+    #[cfg(not(unix))]
+    return file.is_file();
 }

@@ -7,15 +7,20 @@ use glam::DVec3;
 /// The number of characters that a message shows of a text.
 const MOST_SHOWN: usize = 1000;
 
-/// Text as messages show it: on one line, without characters that a terminal obeys or that reverse what follows, and cut after 1000 characters. What
-/// comes from files passes through here on its way out.
+/// Text of a file as messages show it: on one line, without characters that a terminal obeys or that reverse the text behind them, and cut after
+/// 1000 characters.
 pub fn plain(text: &str) -> Plain<'_> {
-    Plain { text, has_lines: false }
+    Plain { text, has_lines: false, most: MOST_SHOWN }
 }
 
-/// As [`plain`], for texts of several lines of any length.
+/// As [`plain`], for texts of several lines, each of which is cut.
 pub fn plain_lines(text: &str) -> Plain<'_> {
-    Plain { text, has_lines: true }
+    Plain { text, has_lines: true, most: MOST_SHOWN }
+}
+
+/// As [`plain_lines`], for results, of which nothing is cut.
+pub fn plain_whole(text: &str) -> Plain<'_> {
+    Plain { text, has_lines: true, most: usize::MAX }
 }
 
 /// A text that is written with escapes.
@@ -23,17 +28,26 @@ pub fn plain_lines(text: &str) -> Plain<'_> {
 pub struct Plain<'a> {
     text: &'a str,
     has_lines: bool,
+    most: usize,
 }
 
 impl Display for Plain<'_> {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        for (at, character) in self.text.chars().enumerate() {
-            if at == MOST_SHOWN && !self.has_lines {
-                return f.write_str("…");
+        let mut in_line = 0_usize;
+        for character in self.text.chars() {
+            if self.has_lines && character == '\n' {
+                in_line = 0;
+                f.write_char(character)?;
+                continue;
             }
+            in_line += 1;
             let is_format =
                 matches!(character, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-            if (character.is_control() || is_format) && !(self.has_lines && character == '\n') {
+            if in_line > self.most {
+                if in_line == self.most + 1 {
+                    f.write_char('…')?;
+                }
+            } else if character.is_control() || is_format {
                 Display::fmt(&character.escape_default(), f)?;
             } else {
                 f.write_char(character)?;
@@ -78,5 +92,7 @@ mod tests {
         assert_eq!(plain_lines("a\u{7}\nb\r").to_string(), "a\\u{7}\nb\\r");
         let long = "x".repeat(1 << 20);
         assert_eq!(plain(&long).to_string(), format!("{}…", &long[..1000]));
+        assert_eq!(plain_lines(&format!("{long}\nb")).to_string(), format!("{}…\nb", &long[..1000]));
+        assert_eq!(plain_whole(&long).to_string(), long);
     }
 }

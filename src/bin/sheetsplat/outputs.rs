@@ -51,7 +51,7 @@ impl Outputs {
         }
     }
 
-    /// What readers must not read.
+    /// The same files, for readers, which refuse to read them.
     pub(crate) fn written(&self) -> volume::Outputs {
         self.0.clone()
     }

@@ -106,7 +106,7 @@ impl<const N: usize> Order<N> {
         self.count += 1;
     }
 
-    /// Adds the files that stand for an import. If there are none, compilation fails with the import's name.
+    /// Adds the files that a variant names for an import. If there are none, compilation fails with the import's name.
     const fn add_variants(&mut self, files: &[File; N], imports: &Numbers<N>, import: &str, variant: &[(&str, &str)]) {
         let (mut at, mut is_known) = (0, false);
         while at < variant.len() {

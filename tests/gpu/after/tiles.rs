@@ -65,7 +65,7 @@ fn compare(seed: u64, has_eye: bool, least: f64, change: impl Fn(&mut Random, &m
             scene.splatting.compositing = compositing;
             change(&mut random, &mut volume, &mut scene);
             let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
-            // What shows next to nothing tests nothing.
+            // A picture that is nearly empty tests nothing.
             if shown(&expected) < 100 {
                 assert!(attempt < 100, "{compositing:?}: too few cases show something");
                 continue;

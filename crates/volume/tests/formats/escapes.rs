@@ -1,4 +1,4 @@
-//! What files hold reaches no terminal as it is.
+//! Messages about files have no control characters, whatever a file holds.
 
 use std::fs;
 use std::path::Path;

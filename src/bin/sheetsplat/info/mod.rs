@@ -7,7 +7,7 @@ use std::fmt::Write;
 use glam::DVec3;
 use serde::{Serialize, Serializer};
 use sheetsplat::appearance::{Preset, quantiles};
-use sheetsplat::internals::plain_lines;
+use sheetsplat::internals::plain_whole;
 use sheetsplat::scene::{OpenVolume, Scene, VolumeSource};
 use sheetsplat::settings::{Camera, Projection};
 use sheetsplat::volume::{Orientation, SampleType, StreamedVolume, Volume};
@@ -137,7 +137,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = if arguments.json {
         serde_json::to_string(&info).map_err(|error| Failure::Other(error.to_string()))? + "\n"
     } else {
-        plain_lines(&described(&info, volume, scene.index.unwrap_or(0))).to_string()
+        plain_whole(&described(&info, volume, scene.index.unwrap_or(0))).to_string()
     };
     stdout(text.as_bytes())
 }
