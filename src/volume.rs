@@ -8,12 +8,13 @@ pub use sheetsplat_volume::{
     open_store, sample,
 };
 
-#[cfg(feature = "cpu")]
-pub(crate) use sheetsplat_volume::for_type;
+#[cfg(feature = "gpu")]
+pub(crate) use sheetsplat_volume::internals::HollowChannel;
 pub(crate) use sheetsplat_volume::internals::{
-    Access, AdaptedStore, COLOR_BYTES, HollowChannel, Resampling, SIZES, SPACING, Sample, Selection, check_grids,
-    check_spacing, dims_of, is_address, labels_of, levels, range, raw_store, sample_of_channels, store, stores,
-    written_in,
+    Access, AdaptedStore, COLOR_BYTES, Resampling, SIZES, SPACING, Selection, check_grids, check_spacing, dims_of,
+    is_address, labels_of, levels, range, raw_store, sample_of_channels, store, stores, written_in,
 };
 #[cfg(feature = "codecs")]
 pub(crate) use sheetsplat_volume::internals::{npy, npz};
+#[cfg(feature = "cpu")]
+pub(crate) use sheetsplat_volume::{for_type, internals::Sample};

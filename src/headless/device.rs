@@ -26,10 +26,27 @@ pub fn adapters() -> Vec<Adapter> {
 
 /// Whether there is a GPU that can run the renderer, and not only a software driver.
 pub fn has_gpu() -> bool {
-    adapters().iter().any(|adapter| {
-        let is_software = adapter.get_info().device_type == DeviceType::Cpu;
-        !is_software && DeviceRequirements::insufficient(&DeviceRequirements::for_adapter(adapter).limits).is_empty()
-    })
+    has_device_file()
+        && adapters().iter().any(|adapter| {
+            let is_software = adapter.get_info().device_type == DeviceType::Cpu;
+            !is_software
+                && DeviceRequirements::insufficient(&DeviceRequirements::for_adapter(adapter).limits).is_empty()
+        })
+}
+
+/// Whether the kernel shows a GPU: without one, no driver need be loaded.
+fn has_device_file() -> bool {
+    let any = |folder: &str, start: &str| {
+        let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.any(|entry| entry.file_name().to_string_lossy().starts_with(start))
+    };
+    // Those of the kernel's own drivers, of NVIDIA's, of Windows' under WSL, and of Mali's.
+    let has = || {
+        [("/dev/dri", "renderD"), ("/dev", "nvidia"), ("/dev", "dxg"), ("/dev", "mali")]
+            .iter()
+            .any(|&(folder, start)| any(folder, start))
+    };
+    cfg!(not(target_os = "linux")) || has()
 }
 
 /// An adapter's driver, and its version where it tells.

@@ -67,7 +67,7 @@ impl Image {
 
     /// An array of rows of pixels of channels, read by the volume reader as slices of rows of voxels.
     fn decode_npy(path: &Path, access: &Access) -> Result<Self, ImageError> {
-        let array = npy::read::<f32>(path, access).map_err(of_volume)?;
+        let array = npy::array(path, access).map_err(of_volume)?;
         let [channels, width, height] = array.dims.to_array();
         if channels != 4 {
             let found = format!("({height}, {width}, {channels})");

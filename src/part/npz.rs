@@ -64,7 +64,7 @@ fn archive(files: &[(&str, &[u8])]) -> Option<Vec<u8>> {
 
 /// What identifies the part in a file, and its channels.
 pub(super) fn decode(path: &Path, access: &Access) -> Result<Decoded, ImageError> {
-    let read = npz::read_text_and_array::<f32>(path, (DESCRIPTION, MAX_DESCRIPTION), PIXELS, access);
+    let read = npz::text_and_array(path, (DESCRIPTION, MAX_DESCRIPTION), PIXELS, access);
     let (json, array) = read.map_err(of_volume)?;
     let (identity, window) = from_json(path, &json)?;
     let (region, names) = (window.region, channel_names(&identity));

@@ -3,6 +3,7 @@
 mod channel;
 mod channels;
 mod check;
+mod color;
 mod definition;
 mod error;
 mod image_settings;

@@ -155,7 +155,14 @@ impl<'a> Section<'a> {
     pub(super) fn finish(self) -> Result<(), SceneError> {
         let Some(name) = self.table.keys().next() else { return Ok(()) };
         let key = self.key(&name.escape_debug().to_string());
-        Err(self.origins.invalid(&key, &self.origins.overrides_within(&key), "an unknown key", self.known.join(", ")))
+        let similar = |known: &&&str| strsim::jaro(known, name) > 0.8;
+        let meant = self
+            .known
+            .iter()
+            .filter(similar)
+            .max_by(|one, other| strsim::jaro(one, name).total_cmp(&strsim::jaro(other, name)));
+        let found = meant.map_or("an unknown key".to_owned(), |meant| format!("an unknown key (perhaps {meant})"));
+        Err(self.origins.invalid(&key, &self.origins.overrides_within(&key), found, self.known.join(", ")))
     }
 
     /// The full name of a key.
@@ -263,8 +270,13 @@ impl<'a> Entry<'a> {
 
     /// An array of N numbers.
     pub(super) fn numbers<const N: usize>(&self, range: Interval) -> Result<[f64; N], SceneError> {
+        self.numbers_or(range, &format!("{N} numbers, each {range}"))
+    }
+
+    /// An array of N numbers, where errors say that something else is allowed too.
+    pub(super) fn numbers_or<const N: usize>(&self, range: Interval, allowed: &str) -> Result<[f64; N], SceneError> {
         let mut numbers = [0.0; N];
-        let items: [Entry; N] = self.array(&format!("{N} numbers, each {range}"))?;
+        let items: [Entry; N] = self.array(allowed)?;
         for (number, item) in numbers.iter_mut().zip(items) {
             *number = item.number(range)?;
         }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
+use super::color::{rgb, rgba};
 use super::names::{
     BOXES, CLASSIFICATIONS, COMPOSITINGS, ENDIANS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS,
 };
@@ -219,7 +220,7 @@ pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
     let mut image = ImageSettings::default();
     section.read("width", &mut image.width, Entry::pixels)?;
     section.read("height", &mut image.height, Entry::pixels)?;
-    section.read("background", &mut image.background, |entry| entry.numbers(Interval::SHARE))?;
+    section.read("background", &mut image.background, rgba)?;
     let origins = section.origins;
     section.finish()?;
     image.check().map_err(|error| origins.refused(error))?;
@@ -275,7 +276,6 @@ fn ramps(
     opacity: &mut Option<Ramp<f64>>,
     gradient_opacity: &mut Option<Ramp<f64>>,
 ) -> Result<(), SceneError> {
-    let rgb = |entry: &Entry| entry.numbers(Interval::SHARE).map(DVec3::from_array);
     let share = |entry: &Entry| entry.number(Interval::SHARE);
     section.read("color", color, |entry| entry.ramp("[value, [r, g, b]]", rgb).map(Some))?;
     section.read("opacity", opacity, |entry| entry.ramp("[value, opacity]", share).map(Some))?;

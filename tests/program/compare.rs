@@ -50,6 +50,35 @@ impl Run {
 }
 
 #[test]
+fn folders_are_compared_name_by_name() {
+    let folder = folder_with(1, 4);
+    for (name, files) in [("drawn", ["a.png", "b.png"]), ("same", ["a.png", "b.png"]), ("other", ["b.png", "a.png"])] {
+        fs::create_dir(folder.path(name)).unwrap();
+        for (from, to) in files.into_iter().zip(["a.png", "b.png"]) {
+            fs::copy(folder.path(from), folder.path(name).join(to)).unwrap();
+        }
+        folder.write(&format!("{name}/note.txt"), "no image");
+    }
+    assert_compares(&folder, "drawn same", 0, &["a.png: passes", "b.png: passes", "0 of 2 images differ"]);
+    assert_compares(
+        &folder,
+        "drawn other",
+        1,
+        &["a.png: differs", "b.png: differs", "green 4", "2 of 2 images differ"],
+    );
+    assert_compares(&folder, "drawn other --tolerance 4", 0, &["0 of 2 images differ"]);
+    fs::remove_file(folder.path("same/b.png")).unwrap();
+    assert_compares(&folder, "drawn same", 1, &["b.png: differs", "none in same", "1 of 2 images differ"]);
+    assert_compares(&folder, "same drawn", 1, &["b.png: differs", "none in same", "1 of 2 images differ"]);
+    fs::create_dir(folder.path("empty")).unwrap();
+    let refused =
+        |arguments: &str, words: &[&str]| folder.run(&format!("compare {arguments}")).assert_failure(2, words);
+    refused("empty empty", &["empty and empty", "no image", ".png, .exr or .npy"]);
+    refused("drawn a.png", &["drawn"]);
+    refused("drawn same --difference d.png", &["--difference", "for folders"]);
+}
+
+#[test]
 fn an_image_of_where_they_differ_is_saved_either_way() {
     let folder = folder_with(3, 5);
     for (tolerance, code, color) in [(3, 1, [255, 50, 0, 255]), (5, 0, [100, 100, 100, 255])] {

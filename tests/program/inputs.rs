@@ -78,7 +78,9 @@ fn raw_files_are_what_the_arguments_say() {
     let size = format!("{SIZE} {WHOLE}");
     let plain = folder.pixels(&format!("a.nrrd {size}"));
     let raw = format!("a.raw {size} --type uint16 --endian big --spacing 1,1,2");
-    assert_eq!(folder.pixels(&format!("{raw} --dims 5,4,3")), plain);
+    for dims in ["5,4,3", "5x4x3"] {
+        assert_eq!(folder.pixels(&format!("{raw} --dims {dims}")), plain);
+    }
     assert_eq!(
         folder.pixels(&format!("{raw} --dims 5,4,2 --offset 40 --set volume.offset=0 --set volume.dims=[5,4,3]")),
         plain
@@ -89,10 +91,10 @@ fn raw_files_are_what_the_arguments_say() {
         folder.run(&format!("render {arguments} -o out.png")).assert_failure(2, words);
     };
     refused(&format!("a.raw {size}"), &["a.raw", "format", "\".raw\"", "volume.dims"]);
-    refused(&raw, &["--set", "volume.dims", "no such key"]);
-    refused(&format!("{raw} --dims 5,4"), &["--set", "volume.dims", "[5, 4]", "three positive integers"]);
+    refused(&raw, &["--dims: found no such key"]);
+    refused(&format!("{raw} --dims 5,4"), &["--dims: found [5, 4]", "three positive integers"]);
     refused(&format!("{raw} --dims 5,4,2"), &["a.raw", "data", "120 bytes", "80 bytes"]);
-    refused("a.raw --dims 5,4,3 --type half", &["--set", "volume.type", "half", "uint16"]);
+    refused("a.raw --dims 5,4,3 --type half", &["--type: found \"half\"", "uint16"]);
 }
 
 /// Where a file states nothing, or nothing valid, a warning says what is assumed.

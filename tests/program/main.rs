@@ -12,6 +12,7 @@ mod compare;
 mod errors;
 mod extremes;
 mod files;
+mod flags;
 mod http;
 mod info;
 mod inputs;

@@ -14,7 +14,7 @@ use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
 use crate::StoreCounts;
 
 /// The contents of a file of values or labels.
-pub struct Loaded<T: Voxel> {
+pub(super) struct Loaded<T: Voxel> {
     pub dims: UVec3,
     /// The type of the samples in the file.
     pub kind: SampleType,

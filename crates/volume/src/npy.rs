@@ -20,6 +20,7 @@ use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::source::MAX_HEADER;
 use super::stream::Stream;
 use super::text::shown;
+use super::values::Values;
 use super::voxel::Voxel;
 
 const TYPES: [(&str, SampleType); 10] = [
@@ -35,8 +36,29 @@ const TYPES: [(&str, SampleType); 10] = [
     ("f8", SampleType::F64),
 ];
 
+/// An array of numbers that is no volume: the pixels of an image, or of a part of one.
+pub struct Array {
+    /// The axes' lengths, from the last one, which is the fastest in memory.
+    pub dims: UVec3,
+    /// The type of the numbers in the file.
+    pub kind: SampleType,
+    /// The numbers, in the order of the file.
+    pub values: Values,
+}
+
+impl From<Loaded<f32>> for Array {
+    fn from(Loaded { dims, kind, values, .. }: Loaded<f32>) -> Self {
+        Self { dims, kind, values }
+    }
+}
+
 /// Reads the array of one file.
-pub fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub fn array(path: &Path, access: &Access) -> Result<Array, VolumeError> {
+    read(path, access).map(Array::from)
+}
+
+/// Reads the volume of one file.
+pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     read_array(path, Stream::raw(access.open(path)?)?)
 }
 

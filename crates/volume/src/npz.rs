@@ -4,24 +4,19 @@ use std::path::Path;
 
 use super::VolumeError;
 use super::access::Access;
-#[cfg(feature = "npy")]
 use super::address::archive_and_inner;
 use super::error::volume::invalid;
 use super::loaded::Loaded;
-use super::npy;
-#[cfg(feature = "npy")]
+use super::npy::{self, Array};
 use super::text::shown;
 use super::voxel::Voxel;
 use super::zip::Directory;
-#[cfg(feature = "npy")]
 use super::zip::Member;
 
 /// The maximum number of names shown in an error.
-#[cfg(feature = "npy")]
 const SHOWN: usize = 12;
 
 /// Reads the only array of a file, or the one that the path names after a colon: `file.npz:name`.
-#[cfg(feature = "npy")]
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let (archive, wanted) = archive_and_inner(path);
     let mut file = access.open(archive)?;
@@ -50,12 +45,12 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
 }
 
 /// Reads the text of one file of an archive, of at most `most` bytes, and one array.
-pub fn read_text_and_array<T: Voxel>(
+pub fn text_and_array(
     path: &Path,
     (text, most): (&str, u64),
     array: &str,
     access: &Access,
-) -> Result<(String, Loaded<T>), VolumeError> {
+) -> Result<(String, Array), VolumeError> {
     let mut file = access.open(path)?;
     let directory = Directory::read(&mut file)?;
     let mut member = |name: &str| {
@@ -67,11 +62,10 @@ pub fn read_text_and_array<T: Voxel>(
         return Err(invalid(path, &text.name, format!("{} bytes", text.bytes), format!("at most {most} bytes")));
     }
     let bytes = text.open(file)?.bytes(text.bytes)?;
-    Ok((String::from_utf8_lossy(&bytes).into_owned(), npy::read_array(path, array.open(access.open(path)?)?)?))
+    Ok((String::from_utf8_lossy(&bytes).into_owned(), npy::read_array(path, array.open(access.open(path)?)?)?.into()))
 }
 
 /// The name of a file's array in NumPy.
-#[cfg(feature = "npy")]
 fn array_name(member: &Member) -> &str {
     member.name.strip_suffix(".npy").unwrap_or(&member.name)
 }

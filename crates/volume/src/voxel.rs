@@ -6,7 +6,7 @@ use super::sample_type::{Sample, SampleType};
 use super::values::Values;
 
 /// Voxels in memory, where many together may take fewer bits than each alone.
-pub trait Many<T>: Default + Sync + From<Vec<T>> {
+pub(super) trait Many<T>: Default + Sync + From<Vec<T>> {
     fn count(&self) -> usize;
 
     /// The voxel at an index.
@@ -108,7 +108,7 @@ impl Many<u16> for Vec<u16> {
 }
 
 /// A number that samples are converted to: a value or a label.
-pub trait Voxel: Copy + Send + Sync {
+pub(super) trait Voxel: Copy + Send + Sync {
     /// Many of them.
     type Many: Many<Self>;
 

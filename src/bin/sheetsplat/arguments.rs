@@ -18,6 +18,23 @@ use crate::failure::Failure;
 use crate::outputs::Outputs;
 use crate::reading::Reading;
 
+/// The flags that set keys of the scene.
+const FLAGS: [(&str, &str); 13] = [
+    ("--dims", "volume.dims"),
+    ("--type", "volume.type"),
+    ("--endian", "volume.endian"),
+    ("--offset", "volume.offset"),
+    ("--spacing", "volume.spacing"),
+    ("--channel", "volume.index"),
+    ("--time", "volume.time"),
+    ("--level", "volume.level"),
+    ("--preset", "preset"),
+    ("--colormap", "transfer.colormap"),
+    ("--size", "image.width"),
+    ("--size", "image.height"),
+    ("--background", "image.background"),
+];
+
 /// The scene to draw, and the adapter.
 #[derive(clap::Args)]
 pub(crate) struct Input {
@@ -58,6 +75,14 @@ pub(crate) fn parse_degrees(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|turn: &f64| turn.is_finite()).ok_or_else(|| "allowed: a finite number".to_owned())
 }
 
+/// Parses `WxH`, or `W` for a square.
+fn parse_size(text: &str) -> Result<[u32; 2], String> {
+    let (width, height) = text.split_once(['x', '×']).unwrap_or((text, text));
+    let parse = |side: &str| side.parse().ok().filter(|side| *side > 0);
+    let sides = parse(width).zip(parse(height));
+    sides.map(Into::into).ok_or_else(|| "allowed: W or WxH, integers >= 1".to_owned())
+}
+
 /// Appearance by name: shorthand for the scene's keys, applied before --set.
 #[derive(clap::Args)]
 struct Look {
@@ -65,6 +90,12 @@ struct Look {
     /// preset=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name)))]
     preset: Option<String>,
+    /// The picture's size in pixels, or a window's in points: short for --set image.width=W and image.height=H. W alone is square.
+    #[arg(long, value_name = "W[xH]", value_parser = parse_size)]
+    size: Option<[u32; 2]>,
+    /// What shows behind the object: a CSS colour as white, #fff or transparent; short for --set image.background=COLOR.
+    #[arg(long, value_name = "COLOR")]
+    background: Option<String>,
     /// Colours over the visible values, or the palette of the volume's file, in place of the scene's: short for --set
     /// transfer.colormap=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
@@ -74,14 +105,18 @@ struct Look {
 impl Look {
     fn sets(&self) -> impl Iterator<Item = String> {
         let preset = self.preset.iter().map(|name| format!("preset={name}"));
-        preset.chain(self.colormap.iter().map(|name| format!("transfer.colormap={name}")))
+        let colormap = self.colormap.iter().map(|name| format!("transfer.colormap={name}"));
+        let sizes = self.size.iter().flatten().zip(["width", "height"]);
+        let size = sizes.map(|(pixels, side)| format!("image.{side}={pixels}"));
+        let background = self.background.iter().map(|color| format!("image.background={color}"));
+        preset.chain(colormap).chain(size).chain(background)
     }
 }
 
 /// The layout of a raw file: shorthand for the scene's keys, applied before --set.
 #[derive(clap::Args)]
 struct Raw {
-    /// Voxels of a file without a header: short for --set volume.dims=[X,Y,Z].
+    /// Voxels of a file without a header, also XxYxZ: short for --set volume.dims=[X,Y,Z].
     #[arg(long, value_name = "X,Y,Z")]
     dims: Option<String>,
     /// Its samples' type, uint8, int16, float32, …: short for --set volume.type=TYPE.
@@ -121,7 +156,9 @@ pub(crate) enum View {
 impl Raw {
     /// `time` is that to be shown.
     fn sets(&self, time: Option<&str>) -> Vec<String> {
-        let array = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}=[{value}]"));
+        let array = |key: &str, value: &Option<String>| {
+            value.as_ref().map(|value| format!("volume.{key}=[{}]", value.replace(['x', '×'], ",")))
+        };
         let plain = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}={value}"));
         let sets = [
             array("dims", &self.dims),
@@ -151,6 +188,12 @@ impl From<View> for volume::PatientSide {
 }
 
 impl Input {
+    /// The size that `--size` gives, pixels or points.
+    #[cfg(feature = "viewer")]
+    pub(crate) fn size(&self) -> Option<[u32; 2]> {
+        self.look.size
+    }
+
     /// The options for reading the scene and its volume.
     pub(crate) fn options(&self) -> ReadOptions {
         let mut options = self.reading.options();
@@ -158,12 +201,12 @@ impl Input {
         options
     }
 
-    pub(crate) fn scene(&self) -> Result<Scene, SceneError> {
+    pub(crate) fn scene(&self) -> Result<Scene, Failure> {
         self.scene_with(&self.sets)
     }
 
     /// The scene with these settings in place of those of --set. The input is a scene file by its extension, or else a volume.
-    pub(crate) fn scene_with(&self, sets: &[String]) -> Result<Scene, SceneError> {
+    pub(crate) fn scene_with(&self, sets: &[String]) -> Result<Scene, Failure> {
         self.scene_of(self.raw.time.as_deref(), sets)
     }
 
@@ -176,13 +219,26 @@ impl Input {
         Ok((self.scene_of(Some(&times.start.to_string()), &self.sets)?, Some(times)))
     }
 
-    fn scene_of(&self, time: Option<&str>, sets: &[String]) -> Result<Scene, SceneError> {
+    fn scene_of(&self, time: Option<&str>, sets: &[String]) -> Result<Scene, Failure> {
         let sets =
             self.raw.sets(time).into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
-        match self.name.strip_prefix("builtin:") {
+        let scene = match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
             None if self.is_scene_file() => Scene::open_with(self.name.as_ref(), &sets, &self.options()),
             None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
+        };
+        scene.map_err(|error| self.by_flag(&error))
+    }
+
+    /// The failure of a scene, by the flag's name where a flag has set the key.
+    fn by_flag(&self, error: &SceneError) -> Failure {
+        let message = error.to_string();
+        let SceneError::Invalid { origin, key, .. } = error else { return Failure::Input(message) };
+        let is_of = |set: &str| key.strip_prefix(set).is_some_and(|rest| rest.is_empty() || rest.starts_with('['));
+        let is_set = self.sets.iter().filter_map(|set| set.split_once('=')).any(|(set, _)| is_of(set.trim()));
+        match FLAGS.iter().find(|(_, set)| is_of(set)).filter(|_| origin == "--set" && !is_set) {
+            Some((flag, _)) => Failure::Input(message.replacen(&format!("--set: {key}"), flag, 1)),
+            None => Failure::Input(message),
         }
     }
 

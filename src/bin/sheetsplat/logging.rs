@@ -1,9 +1,11 @@
 //! The program's log on standard error: what `env_logger` writes, and the library's progress as a line on the terminal.
 
+use std::collections::HashSet;
 use std::fmt;
 use std::io::{IsTerminal, Write, stderr};
+use std::sync::{Mutex, PoisonError};
 
-use log::{LevelFilter, Log, Metadata, Record};
+use log::{Level, LevelFilter, Log, Metadata, Record};
 use sheetsplat::internals::after::coefficients::PROGRESS;
 use sheetsplat::internals::{plain, plain_lines};
 
@@ -11,15 +13,24 @@ use sheetsplat::internals::{plain, plain_lines};
 struct ProgramLog {
     written: env_logger::Logger,
     is_progress_shown: bool,
+    /// The warnings so far: each is written once.
+    warnings: Mutex<HashSet<String>>,
 }
 
-/// Starts the log. Progress is shown if it is wanted and standard error is a terminal.
-pub(crate) fn start(filter: &str, is_progress_wanted: bool) {
-    let written = env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter)).build();
+/// Starts the log. Progress is shown if it is wanted and standard error is a terminal. Without `-v` and RUST_LOG, nobody looks for times and modules.
+pub(crate) fn start(filter: &str, is_verbose: bool, is_progress_wanted: bool) {
+    let mut builder = env_logger::Builder::from_env(env_logger::Env::default().default_filter_or(filter));
+    if !is_verbose && std::env::var_os(env_logger::DEFAULT_FILTER_ENV).is_none() {
+        builder.format(|to, record| {
+            let level = if record.level() == Level::Error { "error" } else { "warning" };
+            writeln!(to, "sheetsplat: {level}: {}", record.args())
+        });
+    }
+    let written = builder.build();
     let is_progress_shown = is_progress_wanted && stderr().is_terminal();
     let level = if is_progress_shown { written.filter().max(LevelFilter::Info) } else { written.filter() };
     // There is no other log.
-    if log::set_boxed_logger(Box::new(ProgramLog { written, is_progress_shown })).is_ok() {
+    if log::set_boxed_logger(Box::new(ProgramLog { written, is_progress_shown, warnings: Mutex::default() })).is_ok() {
         log::set_max_level(level);
     }
 }
@@ -27,6 +38,11 @@ pub(crate) fn start(filter: &str, is_progress_wanted: bool) {
 impl ProgramLog {
     fn is_line(&self, metadata: &Metadata<'_>) -> bool {
         self.is_progress_shown && metadata.target() == PROGRESS && !self.written.enabled(metadata)
+    }
+
+    /// Whether a message is a warning that is written already.
+    fn is_repeated(&self, level: Level, message: &str) -> bool {
+        level == Level::Warn && !self.warnings.lock().unwrap_or_else(PoisonError::into_inner).insert(message.to_owned())
     }
 }
 
@@ -42,6 +58,9 @@ impl Log for ProgramLog {
         } else {
             // Names in files come into warnings.
             let message = record.args().to_string();
+            if self.is_repeated(record.level(), &message) {
+                return;
+            }
             let is_ours = record.target().starts_with("sheetsplat");
             let message = if is_ours { plain(&message) } else { plain_lines(&message) };
             let (level, target, module) = (record.level(), record.target(), record.module_path());
@@ -69,7 +88,7 @@ mod tests {
 
     fn log(filter: &str) -> ProgramLog {
         let written = env_logger::Builder::new().parse_filters(filter).build();
-        ProgramLog { written, is_progress_shown: true }
+        ProgramLog { written, is_progress_shown: true, warnings: Mutex::default() }
     }
 
     fn info(target: &str) -> Metadata<'_> {
@@ -83,6 +102,14 @@ mod tests {
         assert!(!quiet.is_line(&info("sheetsplat::volume")) && !quiet.enabled(&info("sheetsplat::volume")));
         let verbose = log("error,sheetsplat=info");
         assert!(!verbose.is_line(&info(PROGRESS)) && verbose.enabled(&info(PROGRESS)));
+    }
+
+    #[test]
+    fn a_warning_is_written_once() {
+        let log = log("warn");
+        assert!(!log.is_repeated(Level::Warn, "a hole") && !log.is_repeated(Level::Warn, "two holes"));
+        assert!(log.is_repeated(Level::Warn, "a hole"));
+        assert!(!log.is_repeated(Level::Info, "a hole"));
     }
 
     #[test]

@@ -7,6 +7,8 @@ mod arguments;
 mod bench;
 mod canvas;
 mod compare;
+#[cfg(target_os = "linux")]
+mod desktop;
 mod documents;
 mod failure;
 mod index;
@@ -86,9 +88,18 @@ enum Command {
     /// Show a scene in a window, to turn and change it; its image size is ignored.
     #[cfg(feature = "viewer")]
     View(view::Arguments),
+    /// Show a scene in a window: this program was built without it.
+    #[cfg(not(feature = "viewer"))]
+    #[command(hide = true)]
+    View {
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true, hide = true)]
+        _arguments: Vec<std::ffi::OsString>,
+    },
 }
 
 fn main() -> ExitCode {
+    #[cfg(target_os = "linux")]
+    desktop::leave_out_if_missing();
     // Clap itself exits with 2 on bad usage, and with 0 on --help.
     let Arguments { command, quiet, verbose } = Arguments::parse();
     let filter = match (quiet, verbose) {
@@ -97,7 +108,7 @@ fn main() -> ExitCode {
         (false, true) => "error,sheetsplat=info",
     };
     let progress = !quiet && !verbose;
-    logging::start(filter, progress);
+    logging::start(filter, verbose, progress);
     interrupt::listen();
     let result = match command {
         Command::Render(arguments) => render::run(&arguments, progress),
@@ -114,6 +125,11 @@ fn main() -> ExitCode {
         Command::Man(arguments) => documents::man(&arguments, Arguments::command()),
         #[cfg(feature = "viewer")]
         Command::View(arguments) => view::run(&arguments),
+        #[cfg(not(feature = "viewer"))]
+        Command::View { .. } => Err(Failure::Input(
+            "view: found a program without a window, allowed: one built by `cargo build --release --features viewer`"
+                .to_owned(),
+        )),
     };
     let Err(failure) = result else { return ExitCode::SUCCESS };
     // Standard error may be closed.

@@ -15,9 +15,6 @@ Examples:
 pub(crate) struct Arguments {
     #[command(flatten)]
     pub(super) input: Input,
-    /// Size of the window in points (pixels, unless the display is scaled).
-    #[arg(long, value_name = "WxH", default_value = "1280x800", value_parser = parse_size)]
-    pub(super) size: [u16; 2],
     /// Save the window's first complete frame and close the window: .png, .exr or .npy.
     #[arg(long, value_name = "FILE")]
     pub(super) screenshot: Option<PathBuf>,
@@ -26,9 +23,14 @@ pub(crate) struct Arguments {
 /// The result, unless the user closed the window.
 pub(super) type Outcome = Rc<RefCell<Option<Result<(), Failure>>>>;
 
-/// Parses `WxH`.
-fn parse_size(text: &str) -> Result<[u16; 2], String> {
-    let parse = |side: &str| side.parse::<u16>().ok().filter(|side| (100..=16384).contains(side));
-    let sides = text.split_once('x').and_then(|(width, height)| Some([parse(width)?, parse(height)?]));
-    sides.ok_or_else(|| "allowed: WxH, each 100 to 16384".to_owned())
+impl Arguments {
+    /// The size of the window in points (pixels, unless the display is scaled).
+    pub(super) fn size(&self) -> Result<[u16; 2], Failure> {
+        let [width, height] = self.input.size().unwrap_or([1280, 800]);
+        let side = |side: u32| u16::try_from(side).ok().filter(|side| (100..=16384).contains(side));
+        let sides = side(width).zip(side(height)).map(Into::into);
+        let failure =
+            || Failure::Input(format!("--size: found {width}x{height}, allowed for a window: each 100 to 16384"));
+        sides.ok_or_else(failure)
+    }
 }

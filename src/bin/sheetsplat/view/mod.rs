@@ -31,19 +31,20 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     if !matches!(backend, Backend::Auto | Backend::Gpu) {
         return Err(Failure::Input(format!("--backend: found {backend}, allowed: gpu or auto for a window")));
     }
+    let size = arguments.size()?;
     let mut scene = arguments.input.scene()?;
     let named: Vec<_> = arguments.screenshot.iter().map(|path| ("--screenshot", path.as_path())).collect();
     let outputs = Outputs::check(&named, false, &arguments.input.files(&scene))?;
     // Levels are chosen for the window's first picture.
     let image = scene.image;
-    [scene.image.width, scene.image.height] = arguments.size.map(u32::from);
+    [scene.image.width, scene.image.height] = size.map(u32::from);
     scene = Scene { image, ..arguments.input.choose_levels(&scene, Scene::explicit_all_around)? };
     let volume = arguments.input.load_volume(&scene, &outputs)?;
     arguments.input.look_at(&volume, &mut scene)?;
 
     let title = format!("{} - sheetsplat", arguments.input.name);
     let viewport = ViewportBuilder::default()
-        .with_inner_size(arguments.size.map(f32::from))
+        .with_inner_size(size.map(f32::from))
         .with_title(&title)
         .with_icon(IconData::default());
     let options = NativeOptions {

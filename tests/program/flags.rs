@@ -1,0 +1,79 @@
+//! What flags set, by which name errors call them, and what messages look like.
+
+use crate::*;
+
+const CUBE: &str = "builtin:cube:12";
+
+#[test]
+fn size_and_background_are_short_for_keys() {
+    let folder = Folder::new();
+    for (flags, sets) in [
+        ("--size 20x10", "--set image={width=20,height=10}"),
+        ("--size 14", "--set image={width=14,height=14}"),
+        ("--size 9 --background white", "--set image={width=9,height=9,background=[1,1,1,1]}"),
+        ("--size 9 --background #08f", "--set image={width=9,height=9,background=[0,0.53333336,1,1]}"),
+        ("--size 9 --background transparent", "--set image={width=9,height=9,background=[0,0,0,0]}"),
+        // As for the other flags, --set goes before.
+        ("--size 9 --set image.height=5", "--set image={width=9,height=5}"),
+    ] {
+        let by_flags = folder.pixels(&format!("{CUBE} {WHOLE} {flags}"));
+        assert_eq!(by_flags, folder.pixels(&format!("{CUBE} {WHOLE} {sets}")), "{flags}");
+    }
+    for (flags, words) in [
+        ("--size 0", ["--size", "allowed: W or WxH, integers >= 1"]),
+        ("--size 3x", ["--size", "allowed: W or WxH, integers >= 1"]),
+        ("--background whit", ["--background: found \"whit\"", "a CSS colour"]),
+        ("--spacing 1,2", ["--spacing: found [1, 2]", "3 numbers"]),
+        ("--channel one", ["--channel: found \"one\"", "an integer >= 0"]),
+        // A key that --set states too is called by its name.
+        ("--background white --set image.background=red5", ["--set: image.background", "red5"]),
+    ] {
+        folder.run(&format!("render {CUBE} {flags} -o out.png")).assert_failure(2, &words);
+    }
+}
+
+#[test]
+fn a_misspelt_key_suggests_the_key() {
+    let folder = Folder::new();
+    let run = folder.run(&format!("render {CUBE} --set splatting.slab_with=2 -o out.png"));
+    run.assert_failure(2, &["--set: splatting.slab_with", "an unknown key (perhaps slab_width)", "allowed: method"]);
+}
+
+/// Modules and times are for those who ask for a log.
+#[test]
+fn warnings_are_plain_and_come_once() {
+    let folder = Folder::new();
+    let values: Vec<f32> = (0..27).map(|i| if i == 13 { f32::NAN } else { i as f32 }).collect();
+    folder.write_nrrd("holed.nrrd", [3, 3, 3], [1.0; 3], &values);
+    let run = folder.run("render holed.nrrd --size 9 -o out.png");
+    run.assert_success();
+    let message = "sheetsplat: warning: holed.nrrd: 1 of 27 samples are NaN or infinite: these holes are not drawn\n";
+    assert_eq!(run.stderr, message);
+    let logged = folder.run("-v render holed.nrrd --size 9 -o out.png");
+    assert!(logged.stderr.contains("[WARN  sheetsplat") && logged.stderr.contains("[INFO  "), "{}", logged.stderr);
+}
+
+/// Mesa's choice of a GPU by the desktop would print an error each time that adapters are listed.
+#[cfg(target_os = "linux")]
+#[test]
+fn without_a_desktop_session_no_error_is_printed() {
+    let folder = Folder::new();
+    for arguments in ["adapters", "render builtin:cube:12 --size 9 --backend gpu -o out.png"] {
+        let mut command = folder.command(arguments);
+        let output = command.env_remove("XDG_RUNTIME_DIR").env_remove("NODEVICE_SELECT").output().unwrap();
+        assert_eq!(
+            (output.status.code(), String::from_utf8_lossy(&output.stderr).as_ref()),
+            (Some(0), ""),
+            "{arguments}"
+        );
+    }
+}
+
+#[cfg(not(feature = "viewer"))]
+#[test]
+fn a_program_without_a_window_says_so() {
+    let folder = Folder::new();
+    for arguments in ["view", "view builtin:head --size 800x600 --set a=b"] {
+        folder.run(arguments).assert_failure(2, &["view", "without a window", "--features viewer"]);
+    }
+}
