@@ -36,7 +36,7 @@ struct Frame {
     value_offset: f32,
     whole_values: u32,
     channel_table: u32,
-    padding_1: u32,
+    closing: f32,
 }
 
 @group(0) @binding(0) var<uniform> frames: array<Frame, 1>;

@@ -185,8 +185,7 @@ impl<'a> Frame<'a> {
             amplitude: if view.perspective.is_some() { 1.0 } else { view.footprint.amplitude },
             support: kernel.support(),
             region,
-            resolver: (!is_part)
-                .then(|| Resolver::new(splatting.compositing, Classification::Before, image.background)),
+            resolver: (!is_part).then(|| Resolver::new(splatting, Classification::Before, image.background)),
             overlaps,
             projection,
         }

@@ -101,8 +101,8 @@ pub struct Frame {
     pub whole_values: u32,
     /// The start of the table of channels in the control points.
     pub channel_table: u32,
-    /// Unused.
-    pub padding_1: u32,
+    /// The threshold of closing (SPEC §6); 0 where pixels are not closed.
+    pub closing: f32,
 }
 
 /// One sheet group, with the bricks of one list that may reach into it.

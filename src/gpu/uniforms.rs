@@ -20,6 +20,7 @@ use crate::lists::patch_bins::PatchBins;
 use crate::lists::quad_plan::FramePlan;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
+use crate::settings::closing::Closing;
 use crate::settings::shading::{Light, MAX_SHADING, MIN_GRADIENT, Shading};
 use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::Window;
@@ -86,7 +87,7 @@ pub fn frame(
         },
         whole_values: u32::from(values != ValueFormat::Bits),
         channel_table: ramps.channel_table,
-        padding_1: 0,
+        closing: Closing::of(&scene.splatting).map_or(0.0, Closing::threshold),
     }
 }
 

@@ -17,7 +17,7 @@ use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::settings::window::{Region, Window};
 
 /// The version of the description.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// The largest image, pixels along a side, as on the native backend.
 const MAX_SIZE: u32 = 32_768;
@@ -39,6 +39,8 @@ struct Description {
     compositing: String,
     classification: String,
     order: String,
+    opacity_threshold: f64,
+    culling: bool,
     background: [f64; 4],
     /// Not where there is one.
     #[serde(default = "one", skip_serializing_if = "is_one")]
@@ -147,6 +149,8 @@ pub(super) fn to_json(part: &Part) -> serde_json::Result<String> {
         compositing: name_of(COMPOSITINGS, identity.compositing).to_owned(),
         classification: name_of(CLASSIFICATIONS, identity.classification).to_owned(),
         order: name_of(ORDERS, identity.order).to_owned(),
+        opacity_threshold: identity.opacity_threshold,
+        culling: identity.culling,
         background: identity.background,
         images: identity.images,
         means: identity.means.iter().map(Mean::from).collect(),
@@ -159,7 +163,7 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), I
     let description: Description = serde_json::from_str(text)
         .map_err(|error| invalid("part", error.to_string(), "the description that sheetsplat render writes"))?;
     let Description { version, size, region: [x, y, width, height], slabs, scene_slabs, background, .. } = description;
-    let Description { images, means, .. } = description;
+    let Description { images, means, opacity_threshold, culling, .. } = description;
     if version != VERSION {
         return Err(invalid("part.version", version.to_string(), &VERSION.to_string()));
     }
@@ -171,6 +175,9 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), I
         if start > end || !is_within {
             return Err(invalid(key, format!("{start}..{end}"), "A..B, A at most B, both within ±2^30"));
         }
+    }
+    if !(opacity_threshold > 0.0 && opacity_threshold <= 1.0) {
+        return Err(invalid("part.opacity_threshold", opacity_threshold.to_string(), "a number in (0, 1]"));
     }
     let is_color = |channel: &f64| (0.0..=1.0).contains(channel);
     if !background.iter().all(is_color) {
@@ -204,6 +211,8 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), I
         fingerprint: description.scene,
         size,
         slabs: scene_slabs[0]..scene_slabs[1],
+        opacity_threshold,
+        culling,
         background,
     };
     Ok((identity, Window { slabs: slabs[0]..slabs[1], region }))

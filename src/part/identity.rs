@@ -12,7 +12,7 @@ use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::scene::{OpenVolume, Scene};
-use crate::settings::splatting::{Classification, Compositing, Order};
+use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::Window;
 
 /// A part of an image: f32 pixels without the background, and what identifies them.
@@ -46,6 +46,10 @@ pub struct Identity {
     pub classification: Classification,
     /// The order in which sheets are composited.
     pub order: Order,
+    /// The opacity from which pixels count as opaque, and whether anything is culled: [`Image::merge`](crate::image::Image::merge) closes pixels by them (SPEC §6).
+    pub opacity_threshold: f64,
+    /// See [`Self::opacity_threshold`].
+    pub culling: bool,
     /// Straight-alpha RGBA.
     pub background: [f64; 4],
     /// The number of images that are added up: that of the channels where these share no sheets, else 1.
@@ -98,6 +102,8 @@ impl Identity {
             compositing: scene.splatting.compositing,
             classification: scene.classification(volume.sample()),
             order: scene.splatting.order,
+            opacity_threshold: scene.splatting.opacity_threshold,
+            culling: scene.splatting.culling,
             background: scene.image.background,
             images: if adds_up(volume.sample(), scene) { volume.sample().channels().count() } else { 1 },
             means: MeanTables::of(volume.sample(), scene),
@@ -112,6 +118,12 @@ impl Identity {
     /// Whether pixels note labels, whose tables classify means.
     pub(crate) fn notes_labels(&self) -> bool {
         self.means.iter().any(MeanTables::has_labels)
+    }
+
+    /// The settings by which its pixels are finished.
+    pub(super) fn splatting(&self) -> Splatting {
+        let Self { compositing, opacity_threshold, culling, .. } = *self;
+        Splatting { compositing, opacity_threshold, culling, ..Splatting::default() }
     }
 
     pub(super) fn rule(&self) -> Rule {

@@ -124,9 +124,10 @@ impl Image {
 
 /// The pixels of an image of merged slabs.
 fn resolved(contents: Vec<Content>, identity: &Identity) -> Vec<[f32; 4]> {
-    let Identity { compositing, classification, background, means, .. } = identity;
+    let Identity { classification, background, means, .. } = identity;
     let are_joined = contents.len() > 1;
-    let resolver = Resolver::new(*compositing, *classification, if are_joined { [0.0; 4] } else { *background });
+    let behind = if are_joined { [0.0; 4] } else { *background };
+    let resolver = Resolver::new(&identity.splatting(), *classification, behind);
     let of_image = |(number, Content { mut colors, extremes }): (usize, Content)| {
         if let Some(tables) = means.get(number) {
             colors.iter_mut().zip(&extremes).for_each(|(color, mean)| *color = tables.pixel(*color, *mean));
@@ -154,6 +155,8 @@ fn check_identity(part: &Part, other: &str, expected: &Identity) -> Result<(), M
             ("compositing", name_of(COMPOSITINGS, identity.compositing).to_owned()),
             ("classification", name_of(CLASSIFICATIONS, identity.classification).to_owned()),
             ("size", format!("{width}×{height}")),
+            ("opacity threshold", identity.opacity_threshold.to_string()),
+            ("culling", identity.culling.to_string()),
             ("background", format!("{:?}", identity.background)),
             ("images of channels", identity.images.to_string()),
             ("scene's slabs", format!("{}..{}", identity.slabs.start, identity.slabs.end)),

@@ -1,26 +1,29 @@
 //! The compositing buffer over the background (SPEC §5), as in `shaders/resolve.wgsl`.
 
-use crate::settings::splatting::{Classification, Compositing};
+use crate::settings::closing::Closing;
+use crate::settings::splatting::{Classification, Compositing, Splatting};
 
 /// Turns pixels of compositing buffers into pixels of images.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Resolver {
     compositing: Compositing,
+    closing: Option<Closing>,
     /// Premultiplied.
     background: [f32; 4],
 }
 
 impl Resolver {
     /// The background has straight alpha.
-    pub(crate) fn new(compositing: Compositing, classification: Classification, background: [f64; 4]) -> Self {
+    pub(crate) fn new(splatting: &Splatting, classification: Classification, background: [f64; 4]) -> Self {
         // After splatting, sums are clamped; everything else is premultiplied RGBA already.
-        let compositing = match (classification, compositing) {
+        let compositing = match (classification, splatting.compositing) {
             (Classification::After, Compositing::Xray) => Compositing::Xray,
             (Classification::After, _) => Compositing::Linear,
-            _ => compositing,
+            (_, compositing) => compositing,
         };
+        let closing = Closing::of(splatting);
         let [r, g, b, a] = background;
-        Self { compositing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
+        Self { compositing, closing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
     }
 
     /// A pixel over the background, premultiplied like its argument.
@@ -29,7 +32,7 @@ impl Resolver {
             Compositing::Xray | Compositing::Average => acc.map(|channel| channel.min(1.0)),
             Compositing::Minimum if acc[3] > 0.0 => [acc[0], acc[1], acc[2], 2.0 - acc[3]],
             Compositing::Surface if acc[3] < 1.0 => [0.0; 4],
-            _ => acc,
+            _ => self.closing.map_or(acc, |closing| closing.pixel(acc)),
         };
         std::array::from_fn(|channel| image[channel] + (1.0 - image[3]) * self.background[channel])
     }

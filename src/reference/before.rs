@@ -93,7 +93,8 @@ pub(super) fn render_for(
     let frame = Frame::new(volume, transfer, scene)?;
     host.check(scene)?;
     let picture = Picture::drawn(&frame, scene, (host, Window::ALL_SLABS), test);
-    let image = resolve::resolve(&picture.acc, picture.compositing, scene.image.background).into_image();
+    let image =
+        resolve::resolve(&picture.acc, (picture.compositing, &scene.splatting), scene.image.background).into_image();
     let Picture { sections, areas, first_hits, .. } = picture;
     let first_hits = first_hits.map_or(Vec::new(), |hits| hits.depths(&frame.geometry));
     Ok(Culled { image, sections, areas, first_hits })

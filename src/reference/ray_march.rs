@@ -51,7 +51,10 @@ pub fn pixels(
     let field = Field::new(volume, transfer, &exponential, &geometry);
     let marched = pixels.par_iter().map(|&pixel| field.march(&PixelRay::new(&geometry, pixel))).collect();
     let acc = Buffer { width: pixels.len(), pixels: marched };
-    Ok(resolve::resolve(&acc, Compositing::Exponential, scene.image.background).into_image().pixels)
+    // Rays march to their ends.
+    exponential.splatting.culling = false;
+    let finished = (Compositing::Exponential, &exponential.splatting);
+    Ok(resolve::resolve(&acc, finished, scene.image.background).into_image().pixels)
 }
 
 /// The ray of a pixel's centre in voxel coordinates, as a function of its length in `unit`s.

@@ -8,6 +8,7 @@
 pub(crate) mod camera;
 pub(crate) mod clip;
 mod clip_from_world;
+pub(crate) mod closing;
 pub(crate) mod economies;
 pub(crate) mod framing;
 pub mod navigation;

@@ -65,7 +65,8 @@ fn without_low_pass(volume: &Volume, scene: &Scene) -> Image {
         let sheet = splat::sheet(&in_sheet, k, &geometry, &kernel);
         composite(&mut acc, &sheet, scene.splatting.compositing, scene.splatting.order);
     }
-    resolve::resolve(&acc, scene.splatting.compositing, scene.image.background).into_image()
+    let finished = (scene.splatting.compositing, &scene.splatting);
+    resolve::resolve(&acc, finished, scene.image.background).into_image()
 }
 
 /// The rule is for structures finer than a pixel: without it a pixel shows whatever lies behind its centre. (Solid objects are closer to

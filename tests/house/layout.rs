@@ -108,7 +108,7 @@ fn shared() -> [Layout; 17] {
             value_offset,
             whole_values,
             channel_table,
-            padding_1
+            closing
         }),
         layout!(SheetGroup { half_box, box_filter, culling, near, first_brick, brick_count, index, number }),
         layout!(FieldPlanes {

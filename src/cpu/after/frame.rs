@@ -154,8 +154,7 @@ impl<'a> Frame<'a> {
             touched: touched(&placement, &matter),
             slabs,
             region,
-            resolver: (!is_part)
-                .then(|| Resolver::new(splatting.compositing, Classification::After, scene.image.background)),
+            resolver: (!is_part).then(|| Resolver::new(splatting, Classification::After, scene.image.background)),
             grid,
             placement,
         }

@@ -152,7 +152,7 @@ pub fn render_for(
         Compositing::Xray => Compositing::Xray,
         _ => Compositing::Linear,
     };
-    let image = resolve::resolve(&acc, resolved_as, scene.image.background).into_image();
+    let image = resolve::resolve(&acc, (resolved_as, &scene.splatting), scene.image.background).into_image();
     let depth = |(at, pixel): (usize, &Composited)| {
         let at = UVec2::new((at % acc.width) as u32, (at / acc.width) as u32);
         pixel.first_hit.map_or(f64::INFINITY, |sheet| frames[0].pixel(at).depth(sheet))
