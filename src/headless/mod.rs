@@ -1,6 +1,7 @@
 //! Rendering without a host, to images in memory. A [`Backend`] draws them: the GPU, the processor or the f64 evaluation.
 
 mod backend;
+mod blank;
 mod boxed;
 #[cfg(feature = "gpu")]
 mod content;
@@ -236,7 +237,7 @@ impl Headless {
         }
     }
 
-    /// Draws one frame of a view.
+    /// Draws one frame of a view. A warning in the log says if it shows nothing, and the likely reason.
     ///
     /// # Errors
     /// If the backend cannot draw one of the scene's settings, the device fails, or another backend made the view.
@@ -253,6 +254,9 @@ impl Headless {
             (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => view.draw(self),
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
+        if let Some(reason) = blank::reason(&rendering, view.scene(), view.volume().sample()) {
+            log::warn!("{reason}");
+        }
         let store = rendering.stats.store.or(reads);
         Ok(Rendering { stats: Stats { store, ..rendering.stats }, ..rendering })
     }

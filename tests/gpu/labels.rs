@@ -347,12 +347,13 @@ fn tables_without_labels_are_an_error() {
     gpu.render_volume(builtin::volume("head:8").unwrap(), &scene).unwrap();
 }
 
-/// 3D Slicer writes the names of segments.
+/// 3D Slicer writes the names and colours of segments.
 #[test]
-fn names_of_segments_are_read() {
+fn names_and_colours_of_segments_are_read() {
     let folder = Folder::new();
     let segments = "Segment0_ID:=Segment_1\nSegment0_LabelValue:=5\nSegment0_Name:=left lung: lower\nSegment1_Name:=no value\n\
-                    Segment2_LabelValue:=many\nSegment2_Name:=bad\nSegment3_LabelValue:=7\nother_LabelValue:=9\nother_Name:=no";
+                    Segment2_LabelValue:=many\nSegment2_Name:=bad\nSegment3_LabelValue:=7\nother_LabelValue:=9\nother_Name:=no\n\
+                    Segment0_Color:=0.5 0.25 1\nSegment2_Color:=1 1 1\nSegment3_Color:=2 0 0";
     folder.write("labels.nrrd", &format!("type: uint8\nsizes: 2 3 2\n{segments}"), &[5; 12]);
     let names = BTreeMap::from([(5, "left lung: lower".to_owned())]);
     assert_eq!(folder.load(PATH).unwrap().label_names(), &names);
@@ -360,4 +361,7 @@ fn names_of_segments_are_read() {
     let volume = Volume::open(&folder.0.path().join("labels.nrrd")).unwrap();
     assert_eq!(volume.label_names(), &names);
     assert!(sheetsplat::appearance::categories::is_label_map(&volume));
+    let colors = vec![(5.0, DVec3::new(0.5, 0.25, 1.0))];
+    assert_eq!(volume.palette(), Some(&colors[..]));
+    assert_eq!(TransferFunction::from_histogram(&volume).color.points(), colors);
 }

@@ -53,6 +53,26 @@ fn warnings_are_plain_and_come_once() {
     assert!(logged.stderr.contains("[WARN  sheetsplat") && logged.stderr.contains("[INFO  "), "{}", logged.stderr);
 }
 
+#[test]
+fn pictures_that_show_nothing_say_why() {
+    let folder = Folder::new();
+    let said = |arguments: &str| {
+        let run = folder.run(&format!("render {CUBE} --size 12 --backend cpu {arguments} -o out.png"));
+        run.assert_success();
+        run.stderr
+    };
+    let above = said("--set transfer.opacity=[[300,0],[400,1]]");
+    assert!(above.contains("no pixel differs from the background: no voxel takes part"), "{above}");
+    assert!(above.contains("from 0 to 255"), "{above}");
+    for away in ["--set camera.center=[500,0,0] --set camera.height=5", "--set transfer.opacity=[[0,0],[400,1e-9]]"] {
+        let away = said(&format!("--set transfer.color=[[0,[1,1,1]]] {away}"));
+        assert!(away.contains("no pixel differs from the background: the voxels that take part lie outside"), "{away}");
+    }
+    for shown in ["", "--background white", "--background transparent", "--set splatting.compositing=surface"] {
+        assert_eq!(said(shown), "", "{shown}");
+    }
+}
+
 /// Mesa's choice of a GPU by the desktop would print an error each time that adapters are listed.
 #[cfg(target_os = "linux")]
 #[test]

@@ -50,7 +50,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let loaded = Loaded::new(dims, layout.samples.kind, values);
     let spacing = lattice.map(|lattice| lattice.spacing);
     let series = axes.series;
-    let loaded = Loaded { spacing, unit, orientation, label_names: header.label_names(), series, ..loaded };
+    let (label_names, palette) = (header.label_names(), header.palette());
+    let loaded = Loaded { spacing, unit, orientation, label_names, palette, series, ..loaded };
     match lattice {
         Some(lattice) => lattice.straighten(path, DIRECTIONS, loaded, access),
         None => Ok(loaded),
@@ -208,11 +209,28 @@ impl Header {
 
     /// The names of segments, as 3D Slicer writes them: `Segment0_LabelValue:=3`, `Segment0_Name:=liver`.
     fn label_names(&self) -> BTreeMap<u16, String> {
-        let label = |(key, value): (&String, &String)| {
-            let segment = key.strip_suffix("_LabelValue").filter(|segment| segment.starts_with("Segment"))?;
-            Some((value.parse().ok()?, self.1.get(&format!("{segment}_Name"))?.clone()))
+        self.segments("_Name").map(|(label, name)| (label, name.clone())).collect()
+    }
+
+    /// The colours of segments, of which each has three numbers in [0, 1]: `Segment0_Color:=0.5 0.68 0.2`.
+    fn palette(&self) -> Option<Vec<(f64, DVec3)>> {
+        let color = |text: &String| {
+            let numbers: Option<Vec<f64>> = text.split_whitespace().map(|number| number.parse().ok()).collect();
+            let [red, green, blue] = numbers?.try_into().ok()?;
+            Some(DVec3::new(red, green, blue))
+                .filter(|color| color.cmpge(DVec3::ZERO).all() && color.cmple(DVec3::ONE).all())
         };
-        self.1.iter().filter_map(label).collect()
+        let colors: BTreeMap<u16, DVec3> =
+            self.segments("_Color").filter_map(|(label, text)| Some((label, color(text)?))).collect();
+        (!colors.is_empty()).then(|| colors.into_iter().map(|(label, color)| (f64::from(label), color)).collect())
+    }
+
+    /// The labels of segments, and what is said of each by a key with some end.
+    fn segments(&self, end: &str) -> impl Iterator<Item = (u16, &String)> {
+        self.1.iter().filter_map(move |(key, value)| {
+            let segment = key.strip_suffix("_LabelValue").filter(|segment| segment.starts_with("Segment"))?;
+            Some((value.parse().ok()?, self.1.get(&format!("{segment}{end}"))?))
+        })
     }
 
     /// The lattice that `space directions` gives.
