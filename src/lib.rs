@@ -102,6 +102,8 @@
 //! that take part · *label* the number of the segment that a voxel of a segmented volume belongs to
 //! ([`Volume::labels`]) · *brick* 4×4×4 neighbouring voxels · *tile* a square of 32×32 pixels.
 
+#[cfg_attr(not(feature = "cpu"), expect(dead_code, reason = "only the native backend stops early"))]
+mod abandon;
 mod after;
 pub mod appearance;
 #[cfg(feature = "cpu")]
@@ -174,13 +176,18 @@ pub use wgpu;
 /// without notice.
 #[doc(hidden)]
 pub mod internals {
-    pub use sheetsplat_volume::internals::{plain, plain_lines, plain_whole};
+    pub use sheetsplat_volume::internals::{check_spacing, plain, plain_lines, plain_whole, unit};
 
     pub use crate::geometry::{footprint, grid_warp, means, plane_geometry, slab, view_geometry};
     pub use crate::lists::{brick, brick_union, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;
+
+    /// Work that nobody waits for any more.
+    pub mod abandon {
+        pub use crate::abandon::watch;
+    }
 
     /// The reconstruction kernel.
     pub mod kernel {

@@ -8,8 +8,10 @@
 <sheetsplat.Image of 64×64 pixels>
 """
 
+import atexit
 from typing import TYPE_CHECKING, Any
 
+from . import _native
 from .comparison import Comparison, compare
 from .errors import (
     DeviceError,
@@ -20,6 +22,7 @@ from .errors import (
     RenderError,
     SceneError,
     SheetsplatError,
+    SheetsplatWarning,
     VolumeError,
 )
 from .image import Image
@@ -41,6 +44,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "SheetsplatError",
+    "SheetsplatWarning",
     "View",
     "Volume",
     "VolumeError",
@@ -51,6 +55,8 @@ __all__ = [
     "render",
     "sweep",
 ]
+
+atexit.register(_native.tidy)
 
 
 if TYPE_CHECKING:

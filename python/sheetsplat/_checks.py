@@ -6,14 +6,19 @@ import math
 import operator
 from typing import Any
 
-from .errors import SceneError, _Refused
+from .errors import SceneError, VolumeError, _Refused
 
-__all__ = ["finite", "refused", "whole"]
+__all__ = ["finite", "refused", "volume_refused", "whole"]
 
 
 def refused(kind: type[_Refused], key: str, found: object, allowed: str) -> _Refused:
     """The error for an argument."""
     return kind(f"{key}: found {found}, allowed: {allowed}", key, str(found), allowed)
+
+
+def volume_refused(field: str, found: str, allowed: str) -> VolumeError:
+    """The error for an array that is no volume."""
+    return VolumeError(f"array: {field}: found {found}, allowed: {allowed}", field, found, allowed)
 
 
 def whole(key: str, value: Any, low: int, high: int, kind: type[_Refused] = SceneError) -> int:

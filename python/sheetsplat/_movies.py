@@ -41,12 +41,17 @@ def writer(output: str, count: int, fps: float) -> Callable[[Iterator[Image]], N
 
     def write(pictures: Iterator[Image]) -> None:
         # Pictures of 8 bits take a quarter of the memory.
-        first, *others = [picture.to_pil() for picture in pictures]
+        inputs: list[native.Inputs] = []
+        frames = []
+        for picture in pictures:
+            inputs = picture._inputs
+            frames.append(picture.to_pil())
+        first, *others = frames
         movie = io.BytesIO()
         try:
             first.save(movie, kind, save_all=True, append_images=others, duration=1000 / rate, loop=0)
         except (OSError, ValueError) as error:
             raise ImageError(f"{output}: {error}") from error
-        native.write(output, movie.getvalue())
+        native.write(output, movie.getvalue(), inputs)
 
     return write

@@ -1,4 +1,4 @@
-"""Exceptions of this package. Each is a `ValueError` or an `OSError`, too."""
+"""Exceptions of this package, each of which is a `ValueError` or an `OSError`, too, and its warning."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ __all__ = [
     "RenderError",
     "SceneError",
     "SheetsplatError",
+    "SheetsplatWarning",
     "VolumeError",
 ]
 
@@ -74,4 +75,8 @@ class FileError(SheetsplatError, OSError):
 
 
 class DeviceError(SheetsplatError, OSError):
-    """There is no GPU, or it failed."""
+    """There is no GPU, it failed, or the operating system starts no threads."""
+
+
+class SheetsplatWarning(UserWarning):
+    """A picture is another one than might be expected: of the first of several times, of axes that were made orthogonal, with holes."""

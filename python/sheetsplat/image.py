@@ -42,20 +42,30 @@ class Image:
     (64, 48, [0.0, 0.0, 0.0, 1.0])
     """
 
+    __slots__ = ("__weakref__", "_array", "_inputs", "_made_on", "stats")
     stats: dict[str, Any]
     _array: NDArray[np.float32]
     _made_on: tuple[str, str] | None
+    #: What was read for it, none of which it may replace.
+    _inputs: list[_native.Inputs]
 
     def __init__(self, array: Any) -> None:
         if isinstance(array, Image):
             self._array, self.stats, self._made_on = array._array, array.stats, array._made_on
+            self._inputs = array._inputs
             return
-        self._array, self.stats, self._made_on = _premultiplied(array), {}, None
+        self._array, self.stats, self._made_on, self._inputs = _premultiplied(array), {}, None, []
 
     @classmethod
-    def _of(cls, array: NDArray[np.float32], stats: dict[str, Any], made_on: tuple[str, str] | None) -> Image:
+    def _of(
+        cls,
+        array: NDArray[np.float32],
+        stats: dict[str, Any],
+        made_on: tuple[str, str] | None,
+        inputs: list[_native.Inputs],
+    ) -> Image:
         image = cls.__new__(cls)
-        image._array, image.stats, image._made_on = array, stats, made_on
+        image._array, image.stats, image._made_on, image._inputs = array, stats, made_on, inputs
         return image
 
     @classmethod
@@ -80,7 +90,7 @@ class Image:
             If it holds no picture.
         """
         array, made_on = _native.open_image(path)
-        return cls._of(array, {}, made_on)
+        return cls._of(array, {}, made_on, [])
 
     @property
     def width(self) -> int:
@@ -133,10 +143,16 @@ class Image:
             If the file cannot be written; then nothing is left of it.
         ImageError
             If the extension is another one.
+        VolumeError
+            If the file is one that was read for the picture, whatever its name; then nothing changes.
         """
         if depth not in (8, 16):
             raise refused(SceneError, "depth", repr(depth), "8 or 16 bits per channel")
-        _native.save(self._array, path, depth)
+        _native.save(self._array, path, depth, self._inputs)
+
+    def __reduce__(self) -> Any:
+        # What was read for it bears on this process alone.
+        return Image._of, (self._array, self.stats, self._made_on, [])
 
     def _repr_png_(self) -> bytes:
         return _native.encode(self._array, 8)

@@ -88,7 +88,7 @@ class RenderPicture(Container):  # type: ignore[misc]
         picture = view.render()
         if is_mirrored:
             array = np.ascontiguousarray(np.asarray(picture)[:, ::-1])
-            picture = Image._of(array, picture.stats, picture._made_on)
+            picture = Image._of(array, picture.stats, picture._made_on, picture._inputs)
         self.picture = picture
         self.preview.value = picture.to_uint8()
         self.preview.min_width, self.preview.min_height = PREVIEW, PREVIEW * picture.height // picture.width

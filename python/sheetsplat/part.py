@@ -21,16 +21,19 @@ class Part:
         Counts and times of drawing it; empty for a part from a file.
     """
 
+    __slots__ = ("__weakref__", "_inputs", "_native", "stats")
     stats: dict[str, Any]
     _native: native.Part
+    #: What this process read for it, none of which it may replace.
+    _inputs: list[native.Inputs]
 
     def __init__(self) -> None:
         raise TypeError("parts are made by View.part and Part.open")
 
     @classmethod
-    def _of(cls, drawn: native.Part, stats: dict[str, Any]) -> Part:
+    def _of(cls, drawn: native.Part, stats: dict[str, Any], inputs: list[native.Inputs]) -> Part:
         part = cls.__new__(cls)
-        part._native, part.stats = drawn, stats
+        part._native, part.stats, part._inputs = drawn, stats, inputs
         return part
 
     @classmethod
@@ -42,7 +45,7 @@ class Part:
         path : path
             An EXR or NPZ file.
         """
-        return cls._of(native.Part.open(path), {})
+        return cls._of(native.Part.open(path), {}, [])
 
     @classmethod
     def join(cls, parts: Iterable[Part]) -> Part:
@@ -61,7 +64,8 @@ class Part:
         MergeError
             If there is none, or they are not of one picture and region, overlap, or leave out slabs between them.
         """
-        return cls._of(native.Part.join([part._native for part in parts]), {})
+        parts = list(parts)
+        return cls._of(native.Part.join([part._native for part in parts]), {}, _inputs(parts))
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Saves the part as a file that ``sheetsplat merge`` takes, too.
@@ -70,8 +74,13 @@ class Part:
         ----------
         path : path
             ``.exr`` or ``.npz``.
+
+        Raises
+        ------
+        VolumeError
+            If the file is one that this process read for the part, whatever its name; then nothing changes.
         """
-        self._native.save(path)
+        self._native.save(path, self._inputs)
 
     @property
     def slabs(self) -> tuple[int, int]:
@@ -92,7 +101,11 @@ class Part:
 
 
 def _restored(name: str, data: bytes, stats: dict[str, Any]) -> Part:
-    return Part._of(native.Part.from_bytes(name, data), stats)
+    return Part._of(native.Part.from_bytes(name, data), stats, [])
+
+
+def _inputs(parts: list[Part]) -> list[native.Inputs]:
+    return [inputs for part in parts for inputs in part._inputs]
 
 
 def merge(parts: Iterable[Part]) -> Image:
@@ -116,4 +129,5 @@ def merge(parts: Iterable[Part]) -> Image:
     MergeError
         If the parts are not of one scene, leave out slabs or pixels, or overlap.
     """
-    return Image._of(native.merge([part._native for part in parts]), {}, None)
+    parts = list(parts)
+    return Image._of(native.merge([part._native for part in parts]), {}, None, _inputs(parts))

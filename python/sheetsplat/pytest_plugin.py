@@ -133,6 +133,9 @@ def pytest_testnodedown(node: Any, error: object) -> None:
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
     config = session.config
+    if config.option.collectonly:
+        # Nothing was compared, so that the page of the last run still holds.
+        return
     output, failures = _output(config), config.stash[_FAILURES]
     if hasattr(config, "workeroutput"):
         # The controller makes the page, which shows the failures of all workers.

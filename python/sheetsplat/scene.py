@@ -48,6 +48,8 @@ class Scene:
     sheetsplat.errors.SceneError: camera.up: found "north" (string), allowed: 3 numbers, each a finite number
     """
 
+    # A scene does not change: to assign a setting would do nothing.
+    __slots__ = ("__weakref__", "_native")
     _native: native.Scene
 
     def __init__(
@@ -195,9 +197,12 @@ class Scene:
         ------
         FileError
             If the file cannot be written.
+        VolumeError
+            If the file is a volume, or labels, that the scene names.
         """
         target = Path(path)
-        native.write(target, self.to_toml(target.parent).encode())
+        self._native.check_output(target)
+        native.write(target, self.to_toml(target.parent).encode(), [])
 
     def __reduce__(self) -> Any:
         folder = os.getcwd()

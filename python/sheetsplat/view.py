@@ -65,6 +65,9 @@ class View:
     (32, 2560)
     """
 
+    # Settings are changed by `set`: to assign one would do nothing.
+    __slots__ = ("__weakref__", "_inputs", "_native", "_scene", "_volume")
+
     def __init__(
         self,
         source: Any,
@@ -85,6 +88,7 @@ class View:
             look = look.seen_from(volume, side)
         self._volume, self._scene = volume, look
         self._native = native.View(volume._native, look._native, backend, adapter)
+        self._inputs = [volume._native.inputs]
 
     @property
     def volume(self) -> Volume:
@@ -146,7 +150,7 @@ class View:
         if settings:
             self.set(**settings)
         array, stats, made_on = self._native.draw()
-        return Image._of(array, json.loads(stats), made_on)
+        return Image._of(array, json.loads(stats), made_on, self._inputs)
 
     def part(
         self,
@@ -178,7 +182,7 @@ class View:
             x, y, width, height = _several("region", region, 4, 0, 2**32 - 1)
             region = x, y, width, height
         drawn, stats = self._native.draw_part(slabs, region)
-        return Part._of(drawn, json.loads(stats))
+        return Part._of(drawn, json.loads(stats), self._inputs)
 
     def split(self, count: int) -> list[dict[str, Any]]:
         """Parts of about equal work, as keyword arguments for `part`.
@@ -374,20 +378,25 @@ def orbit(
 
     Notes
     -----
-    Ctrl-C stops between two pictures: numbered pictures that are complete stay, a movie is not written.
+    Ctrl-C stops at once: numbered pictures that are complete stay, a movie is not written. A file that is read is never
+    written: nothing is drawn then, and a `VolumeError` is raised.
     """
     numbers = _frames(count, frames)
     if output is None:
         return View(source, progress=progress, **arguments).orbit(count=count, turn=turn, frames=frames)
     path = os.fspath(output)
-    save = movies.writer(path, len(numbers), fps) if movies.is_movie(path) else _saver(path, numbers)
-    turns = View(source, progress=progress, **arguments).orbit(count=count, turn=turn, frames=frames)
-    save(_shown(turns, len(numbers), progress))
+    if movies.is_movie(path):
+        paths, save = [path], movies.writer(path, len(numbers), fps)
+    else:
+        paths, save = _numbered(path, numbers)
+    view = View(source, progress=progress, **arguments)
+    native.check_outputs(paths, view._inputs)
+    save(_shown(view.orbit(count=count, turn=turn, frames=frames), len(numbers), progress))
     return None
 
 
-def _saver(output: str, numbers: range) -> Callable[[Iterator[Image]], None]:
-    """Saves pictures as numbered files, whose pattern is checked before anything is drawn."""
+def _numbered(output: str, numbers: range) -> tuple[list[str], Callable[[Iterator[Image]], None]]:
+    """Numbered files, whose pattern is checked before anything is drawn, and what saves pictures as them."""
     folder, name = os.path.split(output)
     numbered = re.fullmatch(r"([^%#]*)(%d|%0\d{1,2}d|#{1,20})([^%#]*)", name)
     if numbered is None:
@@ -397,12 +406,13 @@ def _saver(output: str, numbers: range) -> Callable[[Iterator[Image]], None]:
     number = f"%0{len(number)}d" if number.startswith("#") else number
     pattern = os.path.join(folder.replace("%", "%%"), before + number + after)
     native.check_format(pattern % 0)
+    paths = [pattern % frame for frame in numbers]
 
     def save(pictures: Iterator[Image]) -> None:
-        for frame, image in zip(numbers, pictures, strict=True):
-            image.save(pattern % frame)
+        for path, image in zip(paths, pictures, strict=True):
+            image.save(path)
 
-    return save
+    return paths, save
 
 
 def _shown(pictures: Iterator[Image], count: int, progress: bool) -> Iterator[Image]:

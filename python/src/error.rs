@@ -1,5 +1,7 @@
 //! Errors as exceptions of the module `sheetsplat.errors`.
 
+use std::fmt::Display;
+
 use pyo3::PyErr;
 use sheetsplat::golden::{ComparisonError, GoldenError, LaxTolerance};
 use sheetsplat::image::ImageError;
@@ -120,6 +122,12 @@ pub(crate) fn forked(what: &str) -> Raised {
     let message = format!(
         "{what}: found a forked process, allowed: the process that imported sheetsplat, or one that is spawned"
     );
+    Raised(classes::DeviceError::new_err(message))
+}
+
+/// The exception where the operating system starts no thread.
+pub(crate) fn no_threads(found: impl Display) -> Raised {
+    let message = format!("threads: found {found}, allowed: as many threads as the machine has cores, and one more");
     Raised(classes::DeviceError::new_err(message))
 }
 

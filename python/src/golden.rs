@@ -9,7 +9,7 @@ use sheetsplat::golden::{self, Golden, GoldenError, MadeOn, Outcome, Picture, Su
 
 use crate::error::Raised;
 use crate::image;
-use crate::process::detached;
+use crate::process::{detached, undisturbed};
 
 /// A picture and where it was made.
 struct Made {
@@ -83,7 +83,7 @@ pub(crate) fn compare(
 ) -> PyResult<Comparison> {
     let tolerance = Tolerance::new(per_channel, outliers).map_err(Raised::from)?;
     let [actual, golden] = [image::image(&actual)?, image::image(&golden)?];
-    let comparison = detached(py, || golden::Comparison::new(&actual, &golden, tolerance).map_err(Raised::from))?;
+    let comparison = detached(py, move || golden::Comparison::new(&actual, &golden, tolerance).map_err(Raised::from))?;
     Ok(Comparison(comparison))
 }
 
@@ -93,7 +93,7 @@ type Opened<'py> = (Bound<'py, PyArray3<f32>>, Option<(String, String)>);
 /// Opens a picture, and says where it was made if the file tells.
 #[pyfunction]
 pub(crate) fn open_image(py: Python<'_>, path: PathBuf) -> PyResult<Opened<'_>> {
-    let Picture { image, made_on, .. } = detached(py, || Picture::open(&path).map_err(Raised::from))?;
+    let Picture { image, made_on, .. } = detached(py, move || Picture::open(&path).map_err(Raised::from))?;
     Ok((image::array(py, image)?, made_on.map(|made_on| (made_on.adapter, made_on.driver))))
 }
 
@@ -115,7 +115,8 @@ pub(crate) fn check_golden(
     if let Some((per_channel, outliers)) = tolerance {
         golden = golden.tolerance(Tolerance::new(per_channel, outliers).map_err(Raised::from)?);
     }
-    match detached(py, || golden.check(&made)) {
+    // It may write files, which Ctrl-C must not leave to be written later.
+    match undisturbed(py, || Ok(golden.check(&made)))? {
         Ok(Outcome::Passed(_)) => Ok((false, None)),
         Ok(Outcome::Blessed(_)) => Ok((true, None)),
         Err(GoldenError::Failure(failure)) => Ok((false, Some(failure.to_string()))),

@@ -1,18 +1,22 @@
 //! Pictures as arrays and files.
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use numpy::{PyArray1, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use sheetsplat::Image;
-use sheetsplat::image::{PngDepth, output};
+use sheetsplat::image::PngDepth;
+use sheetsplat::image::output::{Output, Target};
+use sheetsplat::volume::{self, Outputs};
 
 use crate::error::{self, Raised, setting};
-use crate::process::detached;
+use crate::process::{detached, may_commit, prepare_numpy};
 
 /// The pixels as an array height × width × 4 that owns them.
 pub(crate) fn array(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
+    prepare_numpy(py)?;
     let Image { width, height, pixels } = image;
     PyArray1::from_vec(py, pixels.into_flattened()).reshape([height as usize, width as usize, 4])
 }
@@ -45,17 +49,56 @@ pub(crate) fn check_format(path: PathBuf) -> PyResult<()> {
     Ok(Image::check_format(&path).map_err(Raised::from)?)
 }
 
-/// Saves a picture by the file's extension.
+/// Saves a picture by the file's extension, unless that is the file of an input.
 #[pyfunction]
-pub(crate) fn save(py: Python<'_>, array: PyReadonlyArray3<'_, f32>, path: PathBuf, depth: u8) -> PyResult<()> {
+pub(crate) fn save(
+    py: Python<'_>,
+    array: PyReadonlyArray3<'_, f32>,
+    path: PathBuf,
+    depth: u8,
+    inputs: Vec<PyRef<'_, Inputs>>,
+) -> PyResult<()> {
     let (image, depth) = (image(&array)?, png_depth(depth)?);
-    Ok(detached(py, || image.save(&path, depth).map_err(Raised::from))?)
+    refuse(&inputs, [&path])?;
+    detached(py, move || {
+        let bytes = image.encode(&path, depth)?;
+        output(&path, &bytes)
+    })
 }
 
-/// Writes a whole file, as pictures are written: aside, and then renamed.
+/// Writes a whole file, as pictures are written: aside, and then renamed, unless that is the file of an input.
 #[pyfunction]
-pub(crate) fn write(py: Python<'_>, path: PathBuf, bytes: &[u8]) -> PyResult<()> {
-    Ok(detached(py, || output::write(&path, bytes)).map_err(|source| error::file(&path, &source))?)
+pub(crate) fn write(py: Python<'_>, path: PathBuf, bytes: Vec<u8>, inputs: Vec<PyRef<'_, Inputs>>) -> PyResult<()> {
+    refuse(&inputs, [&path])?;
+    detached(py, move || output(&path, &bytes))
+}
+
+/// Writes a whole file, if anybody still waits for it.
+pub(crate) fn output(path: &Path, bytes: &[u8]) -> Result<(), Raised> {
+    let written = Target::of(path).and_then(Target::create).and_then(|mut output| {
+        output.write_all(bytes)?;
+        if may_commit() { Output::commit(vec![output]).map_err(|(_, error)| error) } else { Ok(()) }
+    });
+    written.map_err(|source| error::file(path, &source))
+}
+
+/// The files that were read for a picture.
+#[pyclass(frozen, module = "sheetsplat._native")]
+pub(crate) struct Inputs(pub(crate) volume::Inputs);
+
+/// Refuses files that would replace an input.
+#[pyfunction]
+pub(crate) fn check_outputs(paths: Vec<PathBuf>, inputs: Vec<PyRef<'_, Inputs>>) -> PyResult<()> {
+    Ok(refuse(&inputs, &paths)?)
+}
+
+/// Refuses files that would replace an input.
+pub(crate) fn refuse(
+    inputs: &[PyRef<'_, Inputs>],
+    paths: impl IntoIterator<Item = impl AsRef<Path>>,
+) -> Result<(), Raised> {
+    let outputs = Outputs::new(paths);
+    inputs.iter().try_for_each(|inputs| Ok(inputs.0.check(&outputs)?))
 }
 
 /// The bytes of a PNG.
@@ -66,6 +109,6 @@ pub(crate) fn encode<'py>(
     depth: u8,
 ) -> PyResult<Bound<'py, PyBytes>> {
     let (image, depth) = (image(&array)?, png_depth(depth)?);
-    let bytes = detached(py, || image.encode(Path::new("picture.png"), depth).map_err(Raised::from))?;
+    let bytes = detached(py, move || image.encode(Path::new("picture.png"), depth).map_err(Raised::from))?;
     Ok(PyBytes::new(py, &bytes))
 }

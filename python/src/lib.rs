@@ -12,6 +12,7 @@ mod scene;
 mod settings;
 mod view;
 mod volume;
+mod warnings;
 
 /// The module `sheetsplat._native`.
 #[pyo3::pymodule]
@@ -21,19 +22,22 @@ mod _native {
     #[pymodule_export]
     use crate::golden::{Comparison, check_golden, compare, open_image};
     #[pymodule_export]
-    use crate::image::{check_format, encode, save, write};
+    use crate::image::{Inputs, check_format, check_outputs, encode, save, write};
     #[pymodule_export]
     use crate::part::{Part, merge, split};
+    #[pymodule_export]
+    use crate::process::tidy;
     #[pymodule_export]
     use crate::scene::{Scene, presets};
     #[pymodule_export]
     use crate::view::View;
     #[pymodule_export]
-    use crate::volume::{BytesRead, Volume, check_sizes};
+    use crate::volume::{BytesRead, Volume, check_sizes, symbol};
 
     #[pymodule_init]
     fn init(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         crate::process::is_forked();
+        crate::warnings::listen();
         Ok(())
     }
 }

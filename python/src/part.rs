@@ -1,6 +1,7 @@
 //! Parts of an image (SPEC §11).
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use numpy::PyArray3;
 use pyo3::prelude::*;
@@ -8,7 +9,7 @@ use pyo3::types::PyBytes;
 use sheetsplat::settings::{Region, Window};
 
 use crate::error::Raised;
-use crate::image;
+use crate::image::{self, Inputs};
 use crate::process::detached;
 use crate::scene::Scene;
 use crate::volume::Volume;
@@ -18,7 +19,7 @@ pub(crate) type Piece = ((i32, i32), (u32, u32, u32, u32));
 
 /// A part of an image.
 #[pyclass(frozen, module = "sheetsplat._native")]
-pub(crate) struct Part(pub(crate) sheetsplat::part::Part);
+pub(crate) struct Part(pub(crate) Arc<sheetsplat::part::Part>);
 
 /// The slabs and pixels of an image that are asked for; all of them where none are.
 pub(crate) fn window(size: [u32; 2], slabs: Option<(i32, i32)>, region: Option<(u32, u32, u32, u32)>) -> Window {
@@ -41,30 +42,39 @@ impl Part {
     /// The part in a file.
     #[staticmethod]
     fn open(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        Ok(detached(py, || sheetsplat::part::Part::open(&path).map(Self).map_err(Raised::from))?)
+        let part = detached(py, move || sheetsplat::part::Part::open(&path).map_err(Raised::from))?;
+        Ok(Self(Arc::new(part)))
     }
 
     /// The part that [`Self::to_bytes`] gave.
     #[staticmethod]
-    fn from_bytes(py: Python<'_>, name: &str, bytes: &[u8]) -> PyResult<Self> {
-        Ok(detached(py, || sheetsplat::part::Part::from_exr(name, bytes).map(Self).map_err(Raised::from))?)
+    fn from_bytes(py: Python<'_>, name: String, bytes: Vec<u8>) -> PyResult<Self> {
+        let part = detached(py, move || sheetsplat::part::Part::from_exr(&name, &bytes).map_err(Raised::from))?;
+        Ok(Self(Arc::new(part)))
     }
 
     /// Parts of the same pixels, whose slabs follow one another, as one part.
     #[staticmethod]
     fn join(py: Python<'_>, parts: Vec<Py<Self>>) -> PyResult<Self> {
-        let parts: Vec<_> = parts.iter().map(|part| part.get().0.clone()).collect();
-        Ok(detached(py, || sheetsplat::part::Part::join(parts).map(Self).map_err(Raised::from))?)
+        let parts = copies(&parts);
+        let part = detached(py, move || sheetsplat::part::Part::join(parts).map_err(Raised::from))?;
+        Ok(Self(Arc::new(part)))
     }
 
-    /// Saves the part by the file's extension.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        Ok(detached(py, || self.0.save(&path).map_err(Raised::from))?)
+    /// Saves the part by the file's extension, unless that is the file of an input.
+    fn save(&self, py: Python<'_>, path: PathBuf, inputs: Vec<PyRef<'_, Inputs>>) -> PyResult<()> {
+        image::refuse(&inputs, [&path])?;
+        let part = Arc::clone(&self.0);
+        detached(py, move || {
+            let bytes = part.encode(&path)?;
+            image::output(&path, &bytes)
+        })
     }
 
     /// The bytes of an EXR file.
     fn to_bytes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let bytes = detached(py, || self.0.encode("part.exr".as_ref()).map_err(Raised::from))?;
+        let part = Arc::clone(&self.0);
+        let bytes = detached(py, move || part.encode("part.exr".as_ref()).map_err(Raised::from))?;
         Ok(PyBytes::new(py, &bytes))
     }
 
@@ -88,17 +98,22 @@ impl Part {
     }
 }
 
+fn copies(parts: &[Py<Part>]) -> Vec<sheetsplat::part::Part> {
+    parts.iter().map(|part| (*part.get().0).clone()).collect()
+}
+
 /// The whole image.
 #[pyfunction]
 pub(crate) fn merge<'py>(py: Python<'py>, parts: Vec<Py<Part>>) -> PyResult<Bound<'py, PyArray3<f32>>> {
-    let parts: Vec<_> = parts.iter().map(|part| part.get().0.clone()).collect();
-    let merged = detached(py, || sheetsplat::Image::merge(parts).map_err(Raised::from))?;
+    let parts = copies(&parts);
+    let merged = detached(py, move || sheetsplat::Image::merge(parts).map_err(Raised::from))?;
     image::array(py, merged)
 }
 
 /// Parts of about equal work.
 #[pyfunction]
 pub(crate) fn split(py: Python<'_>, volume: &Volume, scene: &Scene, parts: usize) -> PyResult<Vec<Piece>> {
-    let windows = detached(py, || sheetsplat::part::split(&volume.0, &scene.scene, parts).map_err(Raised::from))?;
+    let (volume, scene) = (volume.0.clone(), scene.scene.clone());
+    let windows = detached(py, move || sheetsplat::part::split(&volume, &scene, parts).map_err(Raised::from))?;
     Ok(windows.iter().map(piece).collect())
 }

@@ -6,12 +6,13 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use sheetsplat::appearance::Preset;
 use sheetsplat::scene::VolumeSource;
-use sheetsplat::volume::PatientSide;
+use sheetsplat::volume::{Inputs, Outputs, PatientSide};
 
 use crate::error::{Raised, setting};
 use crate::process::detached;
 use crate::settings;
-use crate::volume::{BytesRead, Volume, reading};
+use crate::volume::{BytesRead, Volume, reading, warn_of_holes};
+use crate::warnings;
 
 /// The sides of a patient.
 const SIDES: [(&str, PatientSide); 6] = [
@@ -80,15 +81,22 @@ impl Scene {
         bytes_read: Option<&BytesRead>,
         index: Option<PathBuf>,
     ) -> PyResult<Volume> {
-        let options = reading(memory, index, bytes_read)?;
-        let volume = detached(py, || self.scene.open_volume_with(&options).map_err(Raised::from))?;
-        Ok(Volume(volume))
+        let inputs = Inputs::default();
+        let options = reading(memory, index, bytes_read)?.noted_in(&inputs);
+        let scene = self.scene.clone();
+        let volume = detached(py, move || {
+            let volume = scene.open_volume_with(&options)?;
+            warn_of_holes(&volume, 0);
+            Ok(volume)
+        })?;
+        Ok(Volume(volume, inputs))
     }
 
     /// The scene with everything stated that depends on the volume; `all_around` for a camera that turns.
     fn explicit(&self, py: Python<'_>, volume: &Volume, all_around: bool) -> PyResult<Self> {
-        let explicit = detached(py, || {
-            let (scene, volume) = (&self.scene, volume.0.sample());
+        let (scene, volume) = (self.scene.clone(), volume.0.clone());
+        let explicit = detached(py, move || {
+            let volume = volume.sample();
             scene.check_volume(volume)?;
             Ok::<_, Raised>(if all_around { scene.explicit_all_around(volume) } else { scene.explicit(volume) })
         })?;
@@ -104,7 +112,7 @@ impl Scene {
     }
 
     /// The scene with the camera on one side of the patient.
-    fn seen_from(&self, volume: &Volume, side: &str) -> PyResult<Self> {
+    fn seen_from(&self, py: Python<'_>, volume: &Volume, side: &str) -> PyResult<Self> {
         let Some(&(_, side)) = SIDES.iter().find(|(name, _)| *name == side) else {
             let allowed = SIDES.map(|(name, _)| format!("{name:?}")).join(", ");
             return Err(setting("side", &format!("{side:?}"), &allowed).into());
@@ -113,9 +121,24 @@ impl Scene {
             let allowed = "a volume that says how the patient lies, or camera.direction and camera.up";
             return Err(setting("side", "a volume without orientation", allowed).into());
         };
+        if orientation.is_mirrored() {
+            let message = "side: the volume's axes are left-handed, so the picture is a mirror image of the patient";
+            warnings::give(py, vec![(false, true, message.to_owned())])?;
+        }
         let mut scene = self.scene.clone();
         [scene.camera.direction, scene.camera.up] = orientation.direction_and_up(side);
         Ok(self.derived(scene)?)
+    }
+
+    /// Refuses a file that would replace one that the scene names.
+    fn check_output(&self, path: PathBuf) -> PyResult<()> {
+        let outputs = Outputs::new([&path]);
+        for channel in self.scene.channels() {
+            for named in [channel.volume.path(), channel.labels.as_deref()].into_iter().flatten() {
+                outputs.check_file(named, named).map_err(Raised::from)?;
+            }
+        }
+        Ok(())
     }
 
     /// The text of a scene file in a folder.

@@ -12,7 +12,7 @@ use sheetsplat::scene::OpenVolume;
 use crate::error::{Raised, forked, setting};
 use crate::image;
 use crate::part::{Part, window};
-use crate::process::{detached, is_forked};
+use crate::process::{detached, is_forked, may_commit};
 use crate::scene::Scene;
 use crate::volume::Volume;
 
@@ -21,7 +21,10 @@ type Drawn<'py> = (Bound<'py, PyArray3<f32>>, String, Option<(String, String)>);
 
 /// A view of a volume for any number of pictures. One thread draws at a time.
 #[pyclass(frozen, module = "sheetsplat._native")]
-pub(crate) struct View {
+pub(crate) struct View(Arc<Shared>);
+
+/// A view, shared with a picture that nobody waits for any more.
+struct Shared {
     headless: Arc<Headless>,
     current: Mutex<Current>,
     /// The process that made it, without which a device, and the threads that read a volume while it is drawn, are gone.
@@ -37,7 +40,7 @@ struct Current {
     prepare_ms: f64,
 }
 
-impl View {
+impl Shared {
     /// Checks that what the view draws with is in this process.
     fn check_process(&self) -> Result<(), Raised> {
         let is_here = self.bound_to.is_none_or(|process| process == std::process::id());
@@ -57,49 +60,55 @@ impl View {
         let backend: Backend = backend.parse().map_err(|allowed: String| {
             setting("backend", &format!("{backend:?}"), allowed.trim_start_matches("allowed: "))
         })?;
-        let volume = volume.0.clone();
+        let (volume, scene) = (volume.0.clone(), scene.scene.clone());
         let is_streamed = matches!(volume, OpenVolume::Streamed(_));
-        let view = detached(py, || {
-            let headless = headless(backend, adapter, &scene.scene)?;
+        let view = detached(py, move || {
+            let headless = headless(backend, adapter, &scene)?;
             let start = Instant::now();
-            let view = headless.view(volume, &scene.scene)?;
-            let current = Current { view, size: size(scene), prepare_ms: milliseconds_since(start) };
+            let view = headless.view(volume, &scene)?;
+            let current = Current { view, size: size(&scene), prepare_ms: milliseconds_since(start) };
             let current = Mutex::new(current);
             let is_bound = is_streamed || headless.backend() == Backend::Gpu;
             let bound_to = is_bound.then(std::process::id);
-            Ok::<_, Raised>(Self { headless, current, bound_to })
+            Ok(Shared { headless, current, bound_to })
         })?;
-        Ok(view)
+        Ok(Self(Arc::new(view)))
     }
 
     /// Changes the scene. Only what depends on the change is computed again.
     fn set_scene(&self, py: Python<'_>, scene: &Scene) -> PyResult<()> {
-        detached(py, || {
-            self.check_process()?;
-            let (mut current, start) = (self.lock(), Instant::now());
-            self.headless.set_scene(&mut current.view, &scene.scene)?;
-            current.size = size(scene);
+        let (shared, scene) = (Arc::clone(&self.0), scene.scene.clone());
+        detached(py, move || {
+            shared.check_process()?;
+            let (mut current, start) = (shared.lock(), Instant::now());
+            let before = current.view.scene().clone();
+            shared.headless.set_scene(&mut current.view, &scene)?;
+            if !may_commit() {
+                shared.headless.set_scene(&mut current.view, &before)?;
+                return Ok(());
+            }
+            current.size = size(&scene);
             current.prepare_ms = milliseconds_since(start);
-            Ok::<_, Raised>(())
-        })?;
-        Ok(())
+            Ok(())
+        })
     }
 
     /// The backend that draws.
     #[getter]
     fn backend(&self) -> &'static str {
-        self.headless.backend().name()
+        self.0.headless.backend().name()
     }
 
     /// Draws a picture.
     fn draw<'py>(&self, py: Python<'py>) -> PyResult<Drawn<'py>> {
-        let (rendering, stats) = detached(py, || {
-            self.check_process()?;
-            let mut current = self.lock();
-            let mut rendering = self.headless.draw(&mut current.view).map_err(Raised::from)?;
+        let shared = Arc::clone(&self.0);
+        let (rendering, stats) = detached(py, move || {
+            shared.check_process()?;
+            let mut current = shared.lock();
+            let mut rendering = shared.headless.draw(&mut current.view).map_err(Raised::from)?;
             rendering.stats.prepare_ms = std::mem::take(&mut current.prepare_ms);
             let stats = serde_json::to_string(&rendering.stats);
-            Ok::<_, Raised>((rendering, stats))
+            Ok((rendering, stats))
         })?;
         let stats = stats.map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;
         let made_on = rendering.made_on().map(|made_on| (made_on.adapter, made_on.driver));
@@ -113,21 +122,22 @@ impl View {
         slabs: Option<(i32, i32)>,
         region: Option<(u32, u32, u32, u32)>,
     ) -> PyResult<(Part, String)> {
-        let (drawn, stats) = detached(py, || {
-            self.check_process()?;
-            let mut current = self.lock();
+        let shared = Arc::clone(&self.0);
+        let (drawn, stats) = detached(py, move || {
+            shared.check_process()?;
+            let mut current = shared.lock();
             let window = window(current.size, slabs, region);
-            let (drawn, mut stats) = self.headless.draw_part(&mut current.view, &window).map_err(Raised::from)?;
+            let (drawn, mut stats) = shared.headless.draw_part(&mut current.view, &window).map_err(Raised::from)?;
             stats.prepare_ms = std::mem::take(&mut current.prepare_ms);
-            Ok::<_, Raised>((drawn, serde_json::to_string(&stats)))
+            Ok((drawn, serde_json::to_string(&stats)))
         })?;
         let stats = stats.map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;
-        Ok((Part(drawn), stats))
+        Ok((Part(Arc::new(drawn)), stats))
     }
 }
 
-fn size(scene: &Scene) -> [u32; 2] {
-    [scene.scene.image.width, scene.scene.image.height]
+fn size(scene: &sheetsplat::Scene) -> [u32; 2] {
+    [scene.image.width, scene.image.height]
 }
 
 fn milliseconds_since(start: Instant) -> f64 {

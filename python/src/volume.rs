@@ -9,12 +9,14 @@ use pyo3::types::PyDict;
 use sheetsplat::appearance::{Preset, quantiles};
 use sheetsplat::glam::{DMat3, DVec3, UVec3};
 use sheetsplat::scene::{OpenVolume, VolumeSource};
-use sheetsplat::volume::{Labels, Orientation, ReadOptions, ValueSlice, Values};
+use sheetsplat::volume::{Inputs, Labels, Orientation, ReadOptions, ValueSlice, Values};
 
 use crate::array;
 use crate::error::{self, Raised, setting};
-use crate::process::detached;
+use crate::image;
+use crate::process::{detached, prepare_numpy};
 use crate::scene::Scene;
+use crate::warnings;
 
 /// The name of volumes from arrays in errors.
 const ORIGIN: &str = "array";
@@ -37,7 +39,7 @@ const PERCENTILES: [(f64, &str); 9] = [
 
 /// A volume, shared by every view of it: in memory, or read while it is drawn.
 #[pyclass(frozen, module = "sheetsplat._native")]
-pub(crate) struct Volume(pub(crate) OpenVolume);
+pub(crate) struct Volume(pub(crate) OpenVolume, pub(crate) Inputs);
 
 impl Volume {
     /// The bytes that each value of the channels takes.
@@ -104,9 +106,11 @@ pub(crate) fn check_sizes(shape: Vec<usize>, channels: Vec<usize>, labels: bool,
 
 #[pymethods]
 impl Volume {
-    /// A volume of arrays `[z, y, x]`, one for each channel. `axes` are the directions of x, y and z in the patient (RAS).
+    /// A volume of arrays `[z, y, x]`, one for each channel. `axes` are the directions of x, y and z in the patient (RAS), and `masked` is the number of
+    /// samples that are holes on purpose.
     #[staticmethod]
-    #[pyo3(signature = (channels, spacing, labels=None, axes=None, origin=[0.0; 3], memory=None))]
+    #[pyo3(signature = (channels, spacing, labels=None, axes=None, origin=[0.0; 3], memory=None, unit=None, masked=0))]
+    #[expect(clippy::too_many_arguments, reason = "the package's Python part passes its own")]
     fn from_arrays(
         py: Python<'_>,
         channels: Vec<Bound<'_, PyAny>>,
@@ -115,7 +119,11 @@ impl Volume {
         axes: Option<[[f64; 3]; 3]>,
         origin: [f64; 3],
         memory: Option<&str>,
+        unit: Option<String>,
+        masked: u64,
     ) -> PyResult<Self> {
+        prepare_numpy(py)?;
+        check_spacing(spacing)?;
         let limit = reading(memory, None, None)?.memory_limit();
         let bytes = channels.iter().map(array::value_bytes).collect::<PyResult<Vec<_>>>()?;
         for channel in &channels {
@@ -123,9 +131,12 @@ impl Volume {
         }
         let channels = channels.iter().map(array::values).collect::<Result<Vec<_>, _>>()?;
         let labels = labels.map(|labels| read_labels(labels, &bytes, limit)).transpose()?;
+        if let (Some((of_labels, _)), Some((sizes, _))) = (&labels, channels.first()) {
+            check_labels(*of_labels, *sizes)?;
+        }
         let orientation =
             axes.map(|axes| Orientation { axes: DMat3::from_cols_array_2d(&axes), origin: origin.into() });
-        let volume = detached(py, || {
+        let volume = detached(py, move || {
             let channel = |(dims, values): ([u32; 3], Values)| {
                 sheetsplat::Volume::from_values(ORIGIN, dims.into(), zyx(spacing), values)
             };
@@ -133,9 +144,12 @@ impl Volume {
             let further = volumes.split_off(volumes.len().min(1));
             let first = volumes.pop().ok_or_else(|| error::volume("channels", "none", "at least one"))?;
             let volume = first.with_channels(ORIGIN, further)?.with_orientation(ORIGIN, orientation)?;
-            changed(volume, None, labels)
+            let volume = unit.iter().fold(volume, |volume, unit| volume.with_unit(unit));
+            let volume = changed(volume, None, labels)?.into();
+            warn_of_holes(&volume, masked);
+            Ok(volume)
         })?;
-        Ok(Self(volume.into()))
+        Ok(Self(volume, Inputs::default()))
     }
 
     /// A volume file, a folder of slices, or `builtin:NAME`: the channel, the time and the level that `selection` states. The scene in which it will be shown
@@ -153,7 +167,8 @@ impl Volume {
         changes: Option<Changes<'_>>,
         index: Option<PathBuf>,
     ) -> PyResult<Self> {
-        let mut options = reading(memory, index, bytes_read)?;
+        let inputs = Inputs::default();
+        let mut options = reading(memory, index, bytes_read)?.noted_in(&inputs);
         let (spacing, labels) = changes.unwrap_or_default();
         let labels = labels.map(|labels| read_labels(&labels, &[], options.memory_limit())).transpose()?;
         if let Some((_, labels)) = &labels {
@@ -173,8 +188,12 @@ impl Volume {
         for channel in &mut shown.further {
             (channel.volume, channel.spacing, channel.labels) = (VolumeSource::Memory, None, None);
         }
-        let volume = detached(py, || replaced(shown.open_volume_with(&options)?, spacing, labels))?;
-        Ok(Self(volume))
+        let volume = detached(py, move || {
+            let volume = replaced(shown.open_volume_with(&options)?, spacing, labels)?;
+            warn_of_holes(&volume, 0);
+            Ok(volume)
+        })?;
+        Ok(Self(volume, inputs))
     }
 
     /// The same values with another spacing, in the order z, y, x, or with labels of an array. The values are copied, because views may share these.
@@ -188,7 +207,14 @@ impl Volume {
     ) -> PyResult<Self> {
         let limit = reading(memory, None, None)?.memory_limit();
         let labels = labels.map(|labels| read_labels(labels, &self.value_bytes(), limit)).transpose()?;
-        Ok(Self(detached(py, || replaced(self.0.clone(), spacing, labels))?))
+        let volume = self.0.clone();
+        Ok(Self(detached(py, move || replaced(volume, spacing, labels))?, self.1.clone()))
+    }
+
+    /// The files that were read for it.
+    #[getter]
+    fn inputs(&self) -> image::Inputs {
+        image::Inputs(self.1.clone())
     }
 
     /// The number of voxels along z, y and x.
@@ -245,17 +271,18 @@ impl Volume {
         let count = self.channels();
         let allowed = || error::volume("channel", &channel.to_string(), &format!("0 to {}", count - 1));
         let channel = self.whole("values")?.channels().nth(channel).ok_or_else(allowed)?;
+        prepare_numpy(py)?;
         PyArray1::from_vec(py, channel.values().to_vec()).reshape(self.shape().map(|size| size as usize))
     }
 
     /// Facts about the volume, by the names of `sheetsplat info --json`; sizes and spacings are in the order z, y, x. Of one that is streamed, the values are those
     /// of the sample.
     fn info<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let volume = self.0.sample();
-        let ([min, max, mean], percentiles, suggested) = detached(py, || {
-            let shares = PERCENTILES.map(|(share, _)| share);
-            (extent_and_mean(volume.values()), quantiles(volume.values(), |_| true, shares), Preset::suggested(volume))
-        });
+        let (volume, measured) = (self.0.sample(), Arc::clone(self.0.sample()));
+        let ([min, max, mean], percentiles, suggested) = detached(py, move || {
+            let (values, shares) = (measured.values(), PERCENTILES.map(|(share, _)| share));
+            Ok((extent_and_mean(values), quantiles(values, |_| true, shares), Preset::suggested(&measured)))
+        })?;
         let info = PyDict::new(py);
         info.set_item("shape", self.shape())?;
         info.set_item("spacing", self.spacing())?;
@@ -295,6 +322,38 @@ type LabelArray = ([u32; 3], Arc<[u16]>);
 /// A spacing in the order z, y, x, and an array of labels, which go before a file's.
 type Changes<'py> = (Option<[f64; 3]>, Option<Bound<'py, PyAny>>);
 
+/// Checks a spacing in the order z, y, x, which errors keep.
+fn check_spacing(spacing: [f64; 3]) -> Result<(), Raised> {
+    let checked = sheetsplat::internals::check_spacing("spacing", spacing.into());
+    checked.map_err(|wrong| error::volume(&wrong.key, &wrong.found.to_string(), &wrong.allowed.to_string()))
+}
+
+/// Checks that labels have the sizes of values. Errors have them in the order z, y, x.
+fn check_labels(labels: [u32; 3], values: [u32; 3]) -> Result<(), Raised> {
+    if labels == values {
+        return Ok(());
+    }
+    let shown = |[x, y, z]: [u32; 3]| format!("{z}×{y}×{x}");
+    let found = format!("labels of {} voxels", shown(labels));
+    Err(error::volume("sizes", &found, &format!("{}, as the values along z, y and x", shown(values))))
+}
+
+/// Warns of holes, but for the samples that are masked.
+pub(crate) fn warn_of_holes(volume: &OpenVolume, masked: u64) {
+    let OpenVolume::Whole(volume) = volume else { return };
+    let (holes, samples) = (volume.channels().map(sheetsplat::Volume::holes).sum::<u64>(), volume.values().len());
+    if holes > masked {
+        let count = holes - masked;
+        warnings::warn(format!("{count} of {samples} samples are NaN or infinite: these holes are not drawn"));
+    }
+}
+
+/// The symbol of a unit of length, such as `µm` for `micron`, or else the name itself; `None` if the name says that there is no unit.
+#[pyfunction]
+pub(crate) fn symbol(name: &str) -> Option<String> {
+    sheetsplat::internals::unit(name)
+}
+
 /// The labels of an array, which may take a number of bytes together with the values of some channels, of which each value takes some bytes.
 fn read_labels(labels: &Bound<'_, PyAny>, channels: &[usize], limit: u64) -> Result<LabelArray, Raised> {
     array::sizes(labels)?.check(channels, true, limit)?;
@@ -319,9 +378,11 @@ fn changed(
     labels: Option<LabelArray>,
 ) -> Result<sheetsplat::Volume, Raised> {
     if let Some(spacing) = spacing {
+        check_spacing(spacing)?;
         volume = volume.with_spacing(ORIGIN, zyx(spacing))?;
     }
     if let Some((dims, values)) = labels {
+        check_labels(dims, volume.dims().to_array())?;
         let names = volume.label_names().clone();
         let labels = Labels { origin: "labels".to_owned(), dims: dims.into(), spacing: None, values, names };
         volume = volume.with_labels(labels)?;

@@ -21,6 +21,7 @@ use super::simd::dispatch;
 use super::splat::Splatter;
 use super::stream::{Chunk, Stream};
 use super::tile::TileWalk;
+use crate::abandon::Abandoned;
 use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::kernel::Kernel;
@@ -297,6 +298,7 @@ fn count_overlaps(level: Level, bricks: &[Brick], view: &ViewGeometry) -> Overla
 }
 
 /// The pixels of a tile, row by row.
+#[derive(Default)]
 pub(super) struct Tile {
     pub(super) pixels: Vec<[f32; 4]>,
     /// Empty if no extremes are requested.
@@ -334,11 +336,15 @@ pub(super) fn draw_tiles<W: Send>(
     let by_row = bin::by_row(placed, first_row + strips.len());
     let walks = Mutex::new(Vec::new());
     let idle_walks = || walks.lock().unwrap_or_else(PoisonError::into_inner);
+    let abandoned = Abandoned::here();
     let tally = strips.into_par_iter().enumerate().map(|(at, (colors, (extremes, hits)))| {
         let row = first_row + at;
         let bins = bin::by_tile(&by_row[row], columns);
         // Tile by tile, because a thread that is handed several of the last ones draws alone while others wait.
         let tiles = bins[drawn.clone()].par_iter().zip(drawn.clone()).with_max_len(1).map(|(bricks, column)| {
+            if abandoned.is_true() {
+                return Tile::default();
+            }
             let idle = idle_walks().pop();
             let mut walk = idle.unwrap_or_else(&new_walk);
             let tile = draw_tile(&mut walk, [column * COLUMNS, row * ROWS], bricks);

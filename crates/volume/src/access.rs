@@ -11,6 +11,7 @@ use super::VolumeError;
 use super::address;
 use super::error::volume::{invalid, io_error};
 use super::file::{BytesRead, Files};
+use super::inputs::Inputs;
 use super::located::{Located, Notes};
 use super::memory;
 use super::outputs::Outputs;
@@ -47,6 +48,8 @@ pub struct ReadOptions {
     pub bytes_read: Option<BytesRead>,
     /// The files that will be written, which may not be read.
     pub outputs: Outputs,
+    /// The list in which the files that are read are noted, for programs that write files later.
+    pub inputs: Option<Inputs>,
 }
 
 impl ReadOptions {
@@ -118,6 +121,11 @@ impl ReadOptions {
         Self { outputs, ..self }
     }
 
+    /// These options with a list in which the files that are read are noted.
+    pub fn noted_in(self, inputs: &Inputs) -> Self {
+        Self { inputs: Some(inputs.clone()), ..self }
+    }
+
     /// These options with another memory limit in bytes.
     pub fn with_memory(self, bytes: u64) -> Self {
         Self { memory: Some(bytes), ..self }
@@ -135,6 +143,7 @@ struct Inner {
     reserved: AtomicU64,
     bytes_read: Option<BytesRead>,
     outputs: Outputs,
+    inputs: Option<Inputs>,
 }
 
 /// The folder to which files are confined.
@@ -155,7 +164,8 @@ impl Access {
         let folder = options.confine.as_ref().filter(|_| given.is_none()).map(folder).transpose()?;
         let limit = options.memory_limit();
         let (reserved, bytes_read) = (AtomicU64::new(0), options.bytes_read.clone());
-        let inner = Inner { given, folder, limit, reserved, bytes_read, outputs: options.outputs.clone() };
+        let (outputs, inputs) = (options.outputs.clone(), options.inputs.clone());
+        let inner = Inner { given, folder, limit, reserved, bytes_read, outputs, inputs };
         Ok(Self(
             Arc::new(inner),
             Selection { channel: options.channel, time: options.time, level: options.level },
@@ -275,22 +285,32 @@ impl Access {
         }
     }
 
-    /// Checks that a file is not one that will be written.
+    /// Checks that a file is not one that will be written, and notes that it is read.
     ///
     /// # Errors
-    /// If it is.
+    /// If it will.
     #[doc(hidden)]
     pub fn check_input(&self, path: &Path) -> Result<(), VolumeError> {
-        self.0.outputs.at(path).map_or(Ok(()), |output| Err(would_be_lost(path, output)))
+        self.0.outputs.check_file(path, path)?;
+        self.note_input(path, false);
+        Ok(())
     }
 
-    /// Checks that none of the files in a folder, or in those below it, will be written.
+    /// Checks that none of the files in a folder, or in those below it, will be written, and notes that they are read.
     ///
     /// # Errors
     /// If one will.
     #[cfg(feature = "zarr")]
     pub(super) fn check_folder(&self, path: &Path) -> Result<(), VolumeError> {
-        self.0.outputs.within(path).map_or(Ok(()), |output| Err(would_be_lost(path, output)))
+        self.0.outputs.check_folder(path, path)?;
+        self.note_input(path, true);
+        Ok(())
+    }
+
+    fn note_input(&self, path: &Path, is_folder: bool) {
+        if let Some(inputs) = self.0.inputs.as_ref().filter(|_| self.given().is_none()) {
+            inputs.note(path, is_folder);
+        }
     }
 
     /// The number of bytes of memory that are left.
@@ -312,10 +332,6 @@ impl Access {
         let allowed = format!("at most the memory limit of {limit} bytes{others}");
         Err(invalid(path, field, format!("{found}, which take {bytes} bytes of memory"), allowed))
     }
-}
-
-fn would_be_lost(path: &Path, output: &str) -> VolumeError {
-    invalid(path, "file", format!("the input that {output} would replace"), "another file to write")
 }
 
 impl Debug for Access {

@@ -33,6 +33,7 @@ mod grid;
 mod head;
 mod identity;
 mod index;
+mod inputs;
 mod labels;
 mod loaded;
 mod located;
@@ -95,6 +96,7 @@ pub use error::volume::VolumeError;
 pub use file::{BytesRead, Files};
 pub use grid::Grid;
 pub use index::{IndexedStore, StoreIndex};
+pub use inputs::Inputs;
 pub use labels::Labels;
 pub use open::open_store;
 pub use orientation::{Orientation, PatientSide};
@@ -140,5 +142,6 @@ pub mod internals {
     pub use crate::streamed::{check_grids, sample_of_channels};
     pub use crate::texel::COLOR_BYTES;
     pub use crate::text::{plain, plain_lines, plain_whole};
+    pub use crate::unit::unit;
     pub use crate::volume::HollowChannel;
 }

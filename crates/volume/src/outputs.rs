@@ -4,6 +4,8 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use super::VolumeError;
+use super::error::volume::invalid;
 use super::identity::{Identity, place};
 
 /// The files that a program will write while or after it reads a volume. To read one of them is an error, whatever name leads to it, because its
@@ -79,9 +81,22 @@ impl Outputs {
         Identity::of(path).ok().and_then(|identity| self.0.get(&identity)).map(|output| output.name.as_str())
     }
 
+    /// Checks that a file, which errors call by a name, is none of these.
+    ///
+    /// # Errors
+    /// If it is one.
+    #[doc(hidden)]
+    pub fn check_file(&self, named: &Path, path: &Path) -> Result<(), VolumeError> {
+        self.at(path).map_or(Ok(()), |output| Err(would_be_lost(named, output)))
+    }
+
+    /// Checks that none of the files in a folder, which errors call by a name, or in those below it, is one of these.
+    pub(super) fn check_folder(&self, named: &Path, path: &Path) -> Result<(), VolumeError> {
+        self.within(path).map_or(Ok(()), |output| Err(would_be_lost(named, output)))
+    }
+
     /// The name of an output that lies in a folder or one below it, or that a link there leads to.
-    #[cfg(feature = "zarr")]
-    pub(super) fn within(&self, folder: &Path) -> Option<&str> {
+    fn within(&self, folder: &Path) -> Option<&str> {
         if self.0.is_empty() {
             return None;
         }
@@ -98,7 +113,6 @@ impl Outputs {
 
     /// The name of an output that a file in a folder, or in one below it, is too: a symbolic link, or any file if an output has further names. To list a
     /// folder costs little, but to look at each of its files would take minutes where a store has many chunks.
-    #[cfg(feature = "zarr")]
     fn linked(&self, folder: &Path, has_further_names: bool) -> Option<&str> {
         fs::read_dir(folder).ok()?.flatten().find_map(|entry| {
             let kind = entry.file_type().ok()?;
@@ -113,8 +127,11 @@ impl Outputs {
     }
 }
 
+fn would_be_lost(path: &Path, output: &str) -> VolumeError {
+    invalid(path, "file", format!("the input that {output} would replace"), "another file to write")
+}
+
 /// Whether a file may have another name of its own (a hard link).
-#[cfg(feature = "zarr")]
 fn has_further_names(file: &fs::Metadata) -> bool {
     #[cfg(unix)]
     return std::os::unix::fs::MetadataExt::nlink(file) > 1;

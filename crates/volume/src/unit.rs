@@ -11,7 +11,7 @@ const UNITS: [&[&str]; 6] = [
 ];
 
 /// The symbol of a known unit, or else the name itself; `None` if the name says that there is no unit.
-pub(super) fn unit(name: &str) -> Option<String> {
+pub fn unit(name: &str) -> Option<String> {
     let lower = name.trim().to_lowercase();
     if ["", "none", "unknown", "pixel", "pixels", "voxel", "voxels", "???"].contains(&lower.as_str()) {
         return None;

@@ -15,6 +15,7 @@ use super::orientation::{MAX_COSINE, Orientation};
 use super::sample_type::Sample;
 use super::store::StoreFacts;
 use super::texel::Texel;
+use super::unit;
 use super::value_slice::ValueSlice;
 use super::values::Values;
 use crate::for_type;
@@ -234,6 +235,11 @@ impl Volume {
     /// The name of the world unit, if the file states it: `mm`, `µm`, or whatever else it states.
     pub fn unit(&self) -> Option<&str> {
         self.unit.as_deref()
+    }
+
+    /// The same volume with another name of the world unit. Those of known units become symbols, such as `micron`; one that says that there is no unit is none.
+    pub fn with_unit(self, name: &str) -> Self {
+        Self { unit: unit::unit(name), ..self }
     }
 
     /// How the volume lies in a patient, if known.
