@@ -114,7 +114,7 @@ impl Scene {
             return Err(setting("side", "a volume without orientation", allowed).into());
         };
         let mut scene = self.scene.clone();
-        [scene.camera.direction, scene.camera.up] = orientation.direction_and_up(side);
+        scene.camera = scene.camera.looking(orientation.direction_and_up(side));
         Ok(self.derived(scene)?)
     }
 
