@@ -126,7 +126,7 @@ impl Scene {
             warnings::give(py, vec![(false, true, message.to_owned())])?;
         }
         let mut scene = self.scene.clone();
-        [scene.camera.direction, scene.camera.up] = orientation.direction_and_up(side);
+        scene.camera = scene.camera.looking(orientation.direction_and_up(side));
         Ok(self.derived(scene)?)
     }
 

@@ -3,6 +3,7 @@
 pub mod categories;
 pub(crate) mod channel_display;
 mod colormap;
+mod eye;
 mod haze;
 mod hounsfield;
 mod object;
@@ -16,6 +17,7 @@ mod xray;
 use glam::DVec3;
 
 pub use colormap::Colormap;
+pub use eye::Eye;
 pub use preset::Preset;
 pub use quantile::{histogram, quantiles};
 pub use shown_range::shown_range;

@@ -38,7 +38,7 @@ impl ReferenceView {
         scene.check()?;
         scene.check_volume(&volume)?;
         let transfer = scene.resolve(&volume);
-        Ok(Self { scene: scene.classified(&volume), volume, transfer, first_hit: None, hits: None })
+        Ok(Self { scene: scene.settled(&volume), volume, transfer, first_hit: None, hits: None })
     }
 
     pub(super) fn volume(&self) -> &Arc<Volume> {

@@ -39,6 +39,34 @@ pub(crate) fn of_voxels(
     Some([0, 1].map(|end| UVec3::new(x[end], y[end], z[end])))
 }
 
+/// The maximum distance, in world units, of a voxel that takes part from the middle of the box of voxels `[first, last]`, among those in this box; 0 if
+/// none is there.
+pub(crate) fn farthest(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    clipped: &ClippedVoxels,
+    [first, last]: [UVec3; 2],
+) -> f64 {
+    let (dims, spacing) = (volume.dims(), volume.spacing());
+    let middle = (first + last).as_dvec3() / 2.0;
+    let square = |x: u32, y: u32, z: u32| ((UVec3::new(x, y, z).as_dvec3() - middle) * spacing).length_squared();
+    let taking_part = TakingPart::new(volume, transfer);
+    let of_slice = |z: u32| {
+        let mut flags = vec![false; dims.x as usize];
+        (first.y..=last.y).fold(0.0_f64, |farthest, y| {
+            // No voxel of a row is farther than its ends.
+            if square(first.x, y, z) <= farthest {
+                return farthest;
+            }
+            flags.fill(false);
+            taking_part.flag(dims.x * (y + dims.y * z), clipped.in_row(y, z, dims.x), &mut flags);
+            let shown = (first.x..=last.x).filter(|&x| flags[x as usize]);
+            shown.map(|x| square(x, y, z)).fold(farthest, f64::max)
+        })
+    };
+    (first.z..=last.z).into_par_iter().map(of_slice).reduce(|| 0.0, f64::max).sqrt()
+}
+
 fn sums(mut a: Vec<u64>, b: &[u64]) -> Vec<u64> {
     a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
     a
@@ -91,6 +119,29 @@ mod tests {
         assert_eq!(of(0.001), Some(block));
         assert_eq!(of(0.0004), Some([UVec3::new(1, 0, 0), UVec3::new(29, 19, 24)]));
         assert_eq!(of(0.0), Some([UVec3::new(1, 0, 0), UVec3::new(29, 19, 24)]));
+    }
+
+    #[test]
+    fn the_farthest_voxel_is_that_of_the_box() {
+        let block = [UVec3::new(4, 3, 6), UVec3::new(20, 13, 16)];
+        // Two specks that make the box wider, but lie no farther from its middle than its corners: one of them is nearer than the other.
+        let specks = [UVec3::new(1, 8, 11), UVec3::new(29, 0, 24)];
+        let volume = volume(block, &specks);
+        let of = |bounds: [UVec3; 2], clip: Clip| {
+            let found = farthest(&volume, &transfer(), &clip.voxels(volume.grid(), 2.0), bounds);
+            let middle = (bounds[0] + bounds[1]).as_dvec3() / 2.0;
+            (found, middle)
+        };
+        let (whole, middle) = of([UVec3::new(1, 0, 6), UVec3::new(29, 13, 24)], Clip::default());
+        assert!((whole - middle.distance(specks[1].as_dvec3())).abs() < 1e-12, "{whole}");
+        // Specks that the box leaves out do not count.
+        let (inner, middle) = of(block, Clip::default());
+        assert!((inner - middle.distance(block[1].as_dvec3())).abs() < 1e-12, "{inner}");
+        // Neither do voxels that are cut away: x ≥ 0 keeps the kernels of voxels from 14.5 - 2 on.
+        let clip = Clip { planes: vec![[1.0, 0.0, 0.0, 0.0]], ..Clip::default() };
+        let (cut, middle) = of([block[0], UVec3::new(24, 13, 16)], clip);
+        assert!((cut - middle.distance(UVec3::new(20, 13, 16).as_dvec3())).abs() < 1e-12, "{cut}");
+        assert_eq!(of([UVec3::new(22, 0, 0), UVec3::new(25, 3, 4)], Clip::default()).0, 0.0);
     }
 
     #[test]

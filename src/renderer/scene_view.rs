@@ -53,7 +53,7 @@ impl SceneView {
         scene.check_volume(volume.volume())?;
         let transfer = scene.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
-        let scene = scene.classified(volume.volume());
+        let scene = scene.settled(volume.volume());
         let splatting = &scene.splatting;
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, splatting))?;
         Ok(Self { volume, scene, hiding: None, first_hit: None, window: None, frame: None, extent: OnceLock::new() })
@@ -64,17 +64,17 @@ impl SceneView {
         &self.scene
     }
 
-    /// The camera of the next frame: the scene's, and if that fits an object ([`Fit::Object`](crate::settings::Fit::Object)), with its open
+    /// The camera of the next frame: the scene's, with the direction that the volume chooses where it is open, and if it fits an object ([`Fit::Object`](crate::settings::Fit::Object)), with its open
     /// values chosen for its direction and the image's size. The object's box ([`Scene::extent`]) is found once, with the first frame that
     /// needs it, so that the picture does not move when the transfer function changes. For a camera that turns at constant distance, use
     /// [`Scene::explicit_all_around`].
     pub fn camera(&self) -> Camera {
-        let Scene { camera, image, .. } = &self.scene;
+        let (camera, image) = (self.scene.camera_for(self.volume.volume()), &self.scene.image);
         if !camera.needs_object() {
-            return *camera;
+            return camera;
         }
         let extent = self.extent.get_or_init(|| self.scene.extent(self.volume.volume(), self.volume.transfer()));
-        extent.map_or(*camera, |extent| extent.fit(camera, [image.width, image.height]))
+        extent.map_or(camera, |extent| extent.fit(&camera, [image.width, image.height]))
     }
 
     /// The volume, classified by the current transfer function.

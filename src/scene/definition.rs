@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use glam::DVec3;
 
 use super::{Channel, ImageSettings, TransferSettings, VolumeSource};
-use crate::settings::camera::{Camera, Fit};
+use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
@@ -63,7 +63,7 @@ impl Scene {
             level: None,
             name: None,
             visible: true,
-            camera: Camera { fit: Fit::Object, ..Camera::default() },
+            camera: Camera::of_object(),
             image: ImageSettings::default(),
             clip: Clip::default(),
             transfer: TransferSettings::default(),

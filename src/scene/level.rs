@@ -43,7 +43,7 @@ impl Scene {
         if open.is_empty() {
             return Ok(self.clone());
         }
-        let camera = if self.camera.needs_object() {
+        let camera = if self.camera.needs_object() || self.camera.has_open_eye() {
             let volume = coarse_volume(self, &open, options)?;
             if self.check_volume(&volume).is_err() {
                 return Ok(self.clone());

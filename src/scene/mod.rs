@@ -21,6 +21,7 @@ mod writer;
 use std::path::Path;
 use std::sync::Arc;
 
+use glam::UVec3;
 use toml::Table;
 
 pub use channel::Channel;
@@ -31,10 +32,10 @@ pub use open::OpenVolume;
 pub use source::VolumeSource;
 pub use transfer_settings::TransferSettings;
 
-use crate::appearance::{Preset, categories};
+use crate::appearance::{Eye, Preset, categories};
 use crate::lists::extent;
-use crate::settings::camera::{Camera, Fit};
-use crate::settings::framing::Extent;
+use crate::settings::camera::Camera;
+use crate::settings::framing::{Extent, Sphere};
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::TransferFunction;
@@ -124,25 +125,33 @@ impl Scene {
     /// The same scene with everything stated that depends on the volume: the transfer function, the camera's position and the level. Preset and colour
     /// map are replaced by their results. It renders the same image.
     pub fn explicit(&self, volume: &Volume) -> Self {
-        self.explicit_by(volume, Extent::fit)
+        self.explicit_by(volume, |scene, transfer, size| {
+            scene.extent(volume, transfer).map(|extent| extent.fit(&scene.camera, size))
+        })
     }
 
     /// Like [`Self::explicit`], but a camera that fits an object ([`Fit::Object`]) is placed so that the object stays in the image at
     /// constant size in whichever direction the camera turns: for movies and for cameras that follow a pointer.
     pub fn explicit_all_around(&self, volume: &Volume) -> Self {
-        self.explicit_by(volume, Extent::fit_all_around)
+        self.explicit_by(volume, |scene, transfer, size| {
+            scene.sphere(volume, transfer).map(|sphere| sphere.fit(&scene.camera, size))
+        })
     }
 
-    fn explicit_by(&self, volume: &Volume, fit: impl Fn(&Extent, &Camera, [u32; 2]) -> Camera) -> Self {
-        let transfer = self.resolve(volume);
+    /// `fit` gives the camera for a transfer function and an image's size, or `None` if it stays.
+    fn explicit_by(
+        &self,
+        volume: &Volume,
+        fit: impl Fn(&Self, &TransferFunction, [u32; 2]) -> Option<Camera>,
+    ) -> Self {
+        let settled = self.settled(volume);
         let ImageSettings { width, height, .. } = self.image;
-        let camera =
-            self.extent(volume, &transfer).map_or(self.camera, |extent| fit(&extent, &self.camera, [width, height]));
+        let camera = fit(&settled, &self.resolve(volume), [width, height]).unwrap_or(settled.camera);
         let camera = camera.explicit(volume.drawn_grid(), self.splatting.radius, width, height);
         let mut channels = self.explicit_channels(volume).into_iter();
         let Some(Channel { name, transfer, .. }) = channels.next() else { return self.clone() };
         let level = self.level_in(volume);
-        Self { level, camera, name, transfer, further: channels.collect(), ..self.classified(volume) }
+        Self { level, camera, name, transfer, further: channels.collect(), ..settled }
     }
 
     /// The box that a camera fits under a transfer function (for a scene that leaves it to the volume, that of
@@ -150,23 +159,48 @@ impl Scene {
     /// chosen automatically, the outermost 0.1 % of them at either end of each axis are ignored as noise. `None` if the camera needs no such
     /// box, or no voxel takes part.
     pub fn extent(&self, volume: &Volume, transfer: &TransferFunction) -> Option<Extent> {
+        let voxels = self.shown_voxels(volume, transfer)?;
+        Some(Extent::of_voxels(volume.grid(), voxels, self.splatting.radius))
+    }
+
+    /// The sphere about the middle of [`Self::extent`] that holds these voxels and their kernels, for cameras that turn. `None` as there.
+    pub fn sphere(&self, volume: &Volume, transfer: &TransferFunction) -> Option<Sphere> {
+        let (grid, kernel) = (volume.grid(), self.splatting.radius);
+        let voxels = self.shown_voxels(volume, transfer)?;
+        let farthest = extent::farthest(volume, transfer, &self.clip.voxels(grid, kernel), voxels);
+        let center = Extent::of_voxels(grid, voxels, kernel).center();
+        Some(Sphere { center, radius: farthest + kernel * grid.spacing.max_element() })
+    }
+
+    /// The first and the last voxel of the box that a camera fits; `None` as for [`Self::extent`].
+    fn shown_voxels(&self, volume: &Volume, transfer: &TransferFunction) -> Option<[UVec3; 2]> {
         /// The ignored fraction of voxels at either end of each axis.
         const SPECKS: f64 = 0.001;
         if !self.camera.needs_object() {
             return None;
         }
-        let (grid, radius) = (volume.grid(), self.splatting.radius);
+        let clipped = self.clip.voxels(volume.grid(), self.splatting.radius);
         let specks = if self.channels().any(|channel| channel.transfer.opacity.is_none()) { SPECKS } else { 0.0 };
-        let voxels = extent::of_voxels(volume, transfer, &self.clip.voxels(grid, radius), specks)?;
-        Some(Extent::of_voxels(grid, voxels, radius))
+        extent::of_voxels(volume, transfer, &clipped, specks)
+    }
+
+    /// The eye that a volume chooses for the camera; `None` if the scene states its direction or up.
+    pub fn eye(&self, volume: &Volume) -> Option<Eye> {
+        self.camera.has_open_eye().then(|| Eye::of(volume, self.transfer.preset))
+    }
+
+    /// The camera with the direction and up that a volume chooses ([`Self::eye`]), or its own.
+    pub fn camera_for(&self, volume: &Volume) -> Camera {
+        self.eye(volume).map_or(self.camera, |eye| self.camera.looking(eye.direction_and_up()))
     }
 
     /// The scene with a camera that no longer depends on the object.
     pub(crate) fn framed(&self, volume: &Volume, transfer: &TransferFunction) -> Self {
         let ImageSettings { width, height, .. } = self.image;
-        let extent = self.extent(volume, transfer);
-        let camera = extent.map_or(self.camera, |extent| extent.fit(&self.camera, [width, height]));
-        Self { camera, ..self.classified(volume) }
+        let settled = self.settled(volume);
+        let extent = settled.extent(volume, transfer);
+        let camera = extent.map_or(settled.camera, |extent| extent.fit(&settled.camera, [width, height]));
+        Self { camera, ..settled }
     }
 
     /// Whether values are classified before or after splatting, for a volume (SPEC §9): as stated, or with [`Classification::Auto`] after
@@ -191,10 +225,10 @@ impl Scene {
         if is_sharper && splatting.allows_after() { Classification::After } else { Classification::Before }
     }
 
-    /// The scene with a classification that no longer depends on the volume.
-    pub(crate) fn classified(&self, volume: &Volume) -> Self {
+    /// The scene with a classification, and a direction of its camera, that no longer depend on the volume.
+    pub(crate) fn settled(&self, volume: &Volume) -> Self {
         let splatting = Splatting { classification: self.classification(volume), ..self.splatting };
-        Self { splatting, ..self.clone() }
+        Self { splatting, camera: self.camera_for(volume), ..self.clone() }
     }
 
     /// `source` is the volume of a scene whose tables name none.
@@ -207,7 +241,7 @@ impl Scene {
     ) -> Result<Self, SceneError> {
         // Without these tables, the object is to be shown; overrides of single keys do not change that.
         let is_bare = !["transfer", "channel", "camera"].iter().any(|table| root.contains_key(*table));
-        let fit = if is_bare { Fit::Object } else { Fit::Volume };
+        let camera_by_default = if is_bare { Camera::of_object() } else { Camera::default() };
         let overridden = sets.iter().map(|set| apply_override(&mut root, set)).collect::<Result<_, _>>()?;
         let origins = Origins { file: origin, overridden, written: root.clone() };
         let mut root = Section::root(&origins, root);
@@ -245,7 +279,7 @@ impl Scene {
             level,
             name,
             visible,
-            camera: tables::camera(camera, fit)?,
+            camera: tables::camera(camera, camera_by_default)?,
             image: tables::image(image)?,
             clip: tables::clip(clip)?,
             transfer,

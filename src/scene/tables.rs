@@ -14,7 +14,7 @@ use super::reader::{Entry, LABEL, Section};
 use super::{Channel, ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::error::setting::Interval;
-use crate::settings::camera::{Camera, FOV_Y, Fit, Projection};
+use crate::settings::camera::{Camera, FOV_Y, Projection};
 use crate::settings::clip::{Clip, MAX_PLANES};
 use crate::settings::economies::{Economies, KEYS};
 use crate::settings::shading::{Light, Shading};
@@ -187,16 +187,20 @@ fn raw_layout(section: &mut Section) -> Result<Option<RawLayout>, SceneError> {
     Ok(Some(RawLayout { dims, sample_type, big_endian, offset: offset.unwrap_or(0) }))
 }
 
-/// Reads `[camera]`. Keys of the other projection are checked but have no effect, so that overriding `projection` alone works. `fit` is
-/// the default.
-pub(super) fn camera(mut section: Section, fit: Fit) -> Result<Camera, SceneError> {
-    let mut camera = Camera { fit, ..Camera::default() };
+/// Reads `[camera]`. Keys of the other projection are checked but have no effect, so that overriding `projection` alone works. `default` has
+/// what is not stated.
+pub(super) fn camera(mut section: Section, default: Camera) -> Result<Camera, SceneError> {
+    let mut camera = default;
     let mut is_perspective = false;
     let (mut height, mut fov_y, mut distance, mut near) = (None, 30.0, None, None);
     let projections = [("orthographic", false), ("perspective", true)];
     section.read("projection", &mut is_perspective, |entry| entry.choice(&projections))?;
-    section.read("direction", &mut camera.direction, vector)?;
-    section.read("up", &mut camera.up, vector)?;
+    let (mut direction, mut up) = (None, None);
+    section.read("direction", &mut direction, |entry| vector(entry).map(Some))?;
+    section.read("up", &mut up, |entry| vector(entry).map(Some))?;
+    if direction.is_some() || up.is_some() {
+        camera = camera.looking([direction.unwrap_or(camera.direction), up.unwrap_or(camera.up)]);
+    }
     section.read("center", &mut camera.center, |entry| vector(entry).map(Some))?;
     section.read("fit", &mut camera.fit, |entry| entry.choice(FITS))?;
     section.read("height", &mut height, |entry| entry.number(Interval::POSITIVE).map(Some))?;

@@ -25,7 +25,8 @@ const ON_ONE_LINE: usize = 3;
 impl Scene {
     /// The scene as the text of a scene file in `folder`, which must exist if the scene names files: their paths are written relative to it
     /// if they are relative. [`Self::open`] reads it back as the same scene. What the scene leaves to the volume is omitted;
-    /// [`Self::explicit`] fills it in. A volume in memory has no name, so that [`Self::parse_for`] reads such a scene back.
+    /// [`Self::explicit`] fills it in. A volume in memory has no name, so that [`Self::parse_for`] reads such a scene back. A scene file that states any
+    /// of its camera or its transfer function looks in the default direction unless it states another, and so does such a scene that is read back.
     ///
     /// # Errors
     /// If the path of the volume or of its labels is not UTF-8, or the offset in a raw file exceeds TOML's integers.
@@ -42,7 +43,10 @@ impl Scene {
             write_channel(&mut text, folder, &channel)?;
         }
         text.channel = None;
-        write_camera(&mut text, camera);
+        // Without these tables the camera is this one again (SPEC §2).
+        if !(is_one && !states_transfer(transfer) && *camera == Camera::of_object()) {
+            write_camera(&mut text, camera);
+        }
         write_image(&mut text, image);
         write_clip(&mut text, clip);
         write_shading(&mut text, shading);
@@ -158,7 +162,7 @@ fn numbers(numbers: impl IntoIterator<Item = f64>) -> Value {
 }
 
 fn write_camera(text: &mut Text, camera: &Camera) {
-    let Camera { projection, direction, up, center, fit } = camera;
+    let Camera { projection, direction, up, center, fit, is_eye_open: _ } = camera;
     text.table("camera");
     match *projection {
         Projection::Orthographic { height } => {
@@ -198,7 +202,7 @@ fn write_clip(text: &mut Text, clip: &Clip) {
 fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
     let TransferSettings { preset: _, colormap, color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
     // An empty table would state that the scene has its own transfer function (SPEC §9).
-    if *transfer != (TransferSettings { preset: transfer.preset, ..TransferSettings::default() }) {
+    if states_transfer(transfer) {
         text.table("transfer");
     }
     text.given("colormap", colormap.map(|map| name_of(&Colormap::ALL, map)));
@@ -212,6 +216,11 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
         text.line("visible", tables.visible);
         text.ramps(tables.color.as_ref(), tables.opacity.as_ref(), tables.gradient_opacity.as_ref());
     }
+}
+
+/// Whether there is more to a transfer function than a preset.
+fn states_transfer(transfer: &TransferSettings) -> bool {
+    *transfer != (TransferSettings { preset: transfer.preset, ..TransferSettings::default() })
 }
 
 fn write_shading(text: &mut Text, shading: &Shading) {

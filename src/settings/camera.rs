@@ -60,6 +60,8 @@ pub struct Camera {
     pub center: Option<DVec3>,
     /// What determines the values that are not stated.
     pub fit: Fit,
+    /// Whether `direction` and `up` are chosen for the volume ([`Eye`](crate::appearance::Eye)) as long as both are the defaults.
+    pub is_eye_open: bool,
 }
 
 impl Default for Camera {
@@ -70,11 +72,28 @@ impl Default for Camera {
             up: DVec3::Z,
             center: None,
             fit: Fit::Volume,
+            is_eye_open: false,
         }
     }
 }
 
 impl Camera {
+    /// The camera of a scene that states neither a camera nor a transfer function: it shows the object, from where the volume is best seen (SPEC §2).
+    pub fn of_object() -> Self {
+        Self { fit: Fit::Object, is_eye_open: true, ..Self::default() }
+    }
+
+    /// Whether the volume chooses `direction` and `up`. Others than the defaults count as stated.
+    pub fn has_open_eye(&self) -> bool {
+        let Self { direction, up, .. } = Self::default();
+        self.is_eye_open && (self.direction, self.up) == (direction, up)
+    }
+
+    /// The camera with a stated `direction` and `up`.
+    pub fn looking(self, [direction, up]: [DVec3; 2]) -> Self {
+        Self { direction, up, is_eye_open: false, ..self }
+    }
+
     /// Checks that the values are in range.
     ///
     /// # Errors
@@ -130,7 +149,7 @@ impl Camera {
     /// The camera turned right-handed about its `up` by an angle in degrees; `center` does not change.
     pub fn turned(self, degrees: f64) -> Self {
         let rotation = DMat3::from_axis_angle(scaled(self.up).normalize(), degrees.to_radians());
-        Self { direction: rotation * scaled(self.direction), ..self }
+        self.looking([rotation * scaled(self.direction), self.up])
     }
 
     /// The size of a pixel in `unit`s (SPEC §2) for an image that is `height_world` world units and `height` pixels high.

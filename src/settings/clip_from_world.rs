@@ -58,6 +58,7 @@ fn orthographic([x, y]: [DVec4; 2], pixels: DVec2) -> Result<Camera, RenderError
         up: up.normalize(),
         center: Some(center),
         fit: Fit::Volume,
+        is_eye_open: false,
     })
 }
 
@@ -107,6 +108,7 @@ fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, Render
         up: up.normalize(),
         center: Some(eye + distance * ahead),
         fit: Fit::Volume,
+        is_eye_open: false,
     })
 }
 

@@ -44,36 +44,47 @@ impl Extent {
         };
         let [width, height] = size.map(f64::from);
         let half_height = |q: DVec3| q.dot(basis.v).abs().max(q.dot(basis.u).abs() * height / width) / SHARE;
-        self.filled(camera, &|| 2.0 * largest(&half_height), &|tangent| {
+        filled(camera, self.center(), &|| 2.0 * largest(&half_height), &|tangent| {
             // A stated centre may lie so far behind the box that the eye would have to stand behind the centre.
             largest(&|q| half_height(q) / tangent - q.dot(basis.w)).max((self.high - self.low).min_element())
         })
     }
+}
 
-    /// Like [`Self::fit`], but for the sphere around the box, whose size is the same in all directions: a turning camera keeps its distance.
-    pub fn fit_all_around(&self, camera: &Camera, size: [u32; 2]) -> Camera {
-        let radius = (self.high - self.low).length() / 2.0;
+/// A sphere around an object in world units, which looks the same from everywhere: a camera that turns about it keeps its distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sphere {
+    /// The middle of the object's box ([`Extent::center`]).
+    pub center: DVec3,
+    /// The radius, above 0: voxels that take part lie inside with their kernels.
+    pub radius: f64,
+}
+
+impl Sphere {
+    /// The camera with its open values chosen such that the sphere fills an image of `size` pixels from every direction. A camera that does not
+    /// fit an object is returned unchanged.
+    pub fn fit(&self, camera: &Camera, size: [u32; 2]) -> Camera {
         let [width, height] = size.map(f64::from);
-        self.filled(camera, &|| 2.0 * radius * (height / width).max(1.0) / SHARE, &|tangent| {
-            radius / libm::sin(libm::atan(SHARE * tangent * (width / height).min(1.0)))
+        filled(camera, self.center, &|| 2.0 * self.radius * (height / width).max(1.0) / SHARE, &|tangent| {
+            self.radius / libm::sin(libm::atan(SHARE * tangent * (width / height).min(1.0)))
         })
     }
+}
 
-    /// The camera with its open values filled in; `distance` is a function of `tan(fov_y/2)`.
-    fn filled(&self, camera: &Camera, height: &dyn Fn() -> f64, distance: &dyn Fn(f64) -> f64) -> Camera {
-        if camera.fit != Fit::Object {
-            return *camera;
-        }
-        let projection = match camera.projection {
-            Projection::Orthographic { height: None } => Projection::Orthographic { height: Some(height()) },
-            Projection::Perspective { fov_y, distance: None, near } => {
-                let distance = Some(distance(libm::tan(fov_y.to_radians() / 2.0)));
-                Projection::Perspective { fov_y, distance, near }
-            }
-            given => given,
-        };
-        Camera { projection, center: Some(camera.center.unwrap_or(self.center())), ..*camera }
+/// The camera with its open values filled in; `distance` is a function of `tan(fov_y/2)`.
+fn filled(camera: &Camera, center: DVec3, height: &dyn Fn() -> f64, distance: &dyn Fn(f64) -> f64) -> Camera {
+    if camera.fit != Fit::Object {
+        return *camera;
     }
+    let projection = match camera.projection {
+        Projection::Orthographic { height: None } => Projection::Orthographic { height: Some(height()) },
+        Projection::Perspective { fov_y, distance: None, near } => {
+            let distance = Some(distance(libm::tan(fov_y.to_radians() / 2.0)));
+            Projection::Perspective { fov_y, distance, near }
+        }
+        given => given,
+    };
+    Camera { projection, center: Some(camera.center.unwrap_or(center)), ..*camera }
 }
 
 #[cfg(test)]
@@ -83,6 +94,8 @@ mod tests {
     use super::*;
 
     const EXTENT: Extent = Extent { low: DVec3::new(-30.0, 4.0, -7.0), high: DVec3::new(-9.0, 21.0, 55.0) };
+    /// About the box's corners.
+    const SPHERE: Sphere = Sphere { center: DVec3::new(-19.5, 12.5, 24.0), radius: 33.8 };
     const SIZES: [[u32; 2]; 3] = [[300, 300], [640, 200], [90, 500]];
 
     fn cameras() -> Vec<Camera> {
@@ -127,9 +140,9 @@ mod tests {
 
     #[test]
     fn a_sphere_is_in_the_image_from_everywhere() {
-        let radius = (EXTENT.high - EXTENT.low).length() / 2.0;
+        let radius = SPHERE.radius;
         for size in SIZES {
-            let fitted: Vec<Camera> = cameras().iter().map(|camera| EXTENT.fit_all_around(camera, size)).collect();
+            let fitted: Vec<Camera> = cameras().iter().map(|camera| SPHERE.fit(camera, size)).collect();
             for (at, camera) in fitted.iter().enumerate() {
                 // The projection is the same for every direction.
                 assert_eq!(camera.projection, fitted[at % 3].projection);
@@ -165,9 +178,9 @@ mod tests {
             };
             let given = Camera { projection: given, ..camera };
             assert_eq!(EXTENT.fit(&given, [9, 9]), Camera { center: Some(EXTENT.center()), ..given });
-            assert_eq!(EXTENT.fit_all_around(&given, [9, 9]), Camera { center: Some(EXTENT.center()), ..given });
+            assert_eq!(SPHERE.fit(&given, [9, 9]), Camera { center: Some(SPHERE.center), ..given });
             let whole = Camera { fit: Fit::Volume, ..camera };
-            assert_eq!([EXTENT.fit(&whole, [9, 9]), EXTENT.fit_all_around(&whole, [9, 9])], [whole; 2]);
+            assert_eq!([EXTENT.fit(&whole, [9, 9]), SPHERE.fit(&whole, [9, 9])], [whole; 2]);
         }
     }
 

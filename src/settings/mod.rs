@@ -21,7 +21,7 @@ pub use crate::error::setting::{Allowed, Found, Interval};
 pub use camera::{Camera, Fit, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
 pub use economies::Economies;
-pub use framing::Extent;
+pub use framing::{Extent, Sphere};
 pub use shading::{Gradient, Light, Shading};
 pub use splatting::{
     Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,

@@ -20,7 +20,7 @@ pub fn orbit(camera: &mut Camera, degrees: DVec2) {
     let azimuth = DMat3::from_axis_angle(up, -degrees.x.to_radians());
     let elevation = (elevation(camera) + degrees.y).clamp(-MAX_ELEVATION, MAX_ELEVATION);
     let (sine, cosine) = libm::sincos(elevation.to_radians());
-    camera.direction = azimuth * horizontal * cosine - up * sine;
+    *camera = camera.looking([azimuth * horizontal * cosine - up * sine, camera.up]);
 }
 
 /// The degrees of the eye over the plane through the camera's centre that is perpendicular to `up`.

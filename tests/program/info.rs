@@ -59,18 +59,18 @@ fn frames_are_those_that_render_chooses_and_presets_fit_the_kind_of_data() {
     folder.write_nrrd("block.nrrd", [12; 3], [2.0, 1.0, 0.5], &values);
     let json =
         |arguments: &str| -> Value { serde_json::from_str(&info(&folder, &format!("{arguments} --json"))).unwrap() };
-    let block = json("block.nrrd");
+    let block = json("block.nrrd --set camera.direction=[0,1,0]");
     assert_eq!(block["frame"]["center"], serde_json::json!([-2.0, -1.0, -0.5]));
     // Along y: the block's width of 3 spacings plus two kernels of 2 grid units is 14, its height of 7 and 4 of them is 5.5.
     assert_eq!(block["frame"]["height"], 14.0 / 0.9);
     assert_eq!([&block["frame"]["distance"], &block["preset"]], [&Value::Null; 2]);
-    let text = info(&folder, "block.nrrd");
+    let text = info(&folder, "block.nrrd --set camera.direction=[0,1,0]");
     assert!(text.contains("frame        center -2, -1, -0.5, height 15.5556 (no unit)\n"), "{text}");
     assert!(text.contains("preset       none fits; the transfer function follows the values\n"), "{text}");
-    folder.render("block.nrrd -o block.png --set image.width=20 --set image.height=20 --save-scene block.toml");
+    folder.render("block.nrrd -o block.png --set camera.direction=[0,1,0] --set image.width=20 --set image.height=20 --save-scene block.toml");
     let saved: toml::Table = String::from_utf8(folder.read("block.toml")).unwrap().parse().unwrap();
     assert_eq!(saved["camera"]["height"].as_float(), block["frame"]["height"].as_f64());
-    let eye = json("block.nrrd --set camera.projection=perspective");
+    let eye = json("block.nrrd --set camera={projection=\"perspective\",direction=[0,1,0]}");
     assert!(eye["frame"]["distance"].as_f64().unwrap() > 14.0 && eye["frame"]["height"].is_null(), "{eye}");
 
     // A body of soft tissue with some bone, in signed and unsigned Hounsfield units.

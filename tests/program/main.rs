@@ -11,6 +11,7 @@ mod common;
 mod compare;
 mod errors;
 mod extremes;
+mod eyes;
 mod files;
 mod flags;
 mod http;

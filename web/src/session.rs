@@ -7,13 +7,13 @@ use std::sync::Arc;
 
 use glam::DVec2;
 #[cfg(not(feature = "gpu"))]
-use glam::DVec3;
+use glam::DVec4;
 #[cfg(feature = "gpu")]
 use js_sys::{Array, Float64Array};
 use js_sys::{Map, Uint8Array};
 use serde::Serialize;
 use sheetsplat::scene::{Channel, ImageSettings, VolumeSource};
-use sheetsplat::settings::{Camera, Extent, navigation};
+use sheetsplat::settings::{Camera, Sphere, navigation};
 use sheetsplat::volume::{Files, ReadOptions};
 use sheetsplat::{Pick, Scene, Volume};
 use wasm_bindgen::prelude::wasm_bindgen;
@@ -44,7 +44,7 @@ struct Shown {
     /// The scene's original camera.
     home: Camera,
     /// What a camera that fits the object shows.
-    object: Option<Extent>,
+    object: Option<Sphere>,
 }
 
 type Histograms = Rc<OnceCell<Vec<Histogram>>>;
@@ -178,9 +178,8 @@ impl Session {
             let scene = Scene { camera, ..Scene::new(VolumeSource::Builtin("cube".to_owned())) };
             scene.to_toml(Path::new("")).map_err(error)
         });
-        let object = object.map_or(JsValue::UNDEFINED, |Extent { low, high }| {
-            let corners = [low.to_array(), high.to_array()];
-            Float64Array::from(corners.as_flattened()).into()
+        let object = object.map_or(JsValue::UNDEFINED, |Sphere { center, radius }| {
+            Float64Array::from(&center.extend(radius).to_array()[..]).into()
         });
         Ok(Some(Array::of3(&camera?.into(), &home?.into(), &object)))
     }
@@ -189,16 +188,16 @@ impl Session {
 #[cfg(not(feature = "gpu"))]
 #[wasm_bindgen]
 impl Session {
-    /// Moves the camera to where another session's is: it and its home as texts of scene files, and the corners of what it frames.
+    /// Moves the camera to where another session's is: it and its home as texts of scene files, and the sphere that it frames, by its centre and radius.
     #[wasm_bindgen(js_name = setPose)]
     pub fn set_pose(&mut self, camera: &str, home: &str, object: Option<Vec<f64>>) -> Result<(), JsValue> {
         let shown = self.shown.as_mut().ok_or_else(nothing)?;
         let [camera, home] = [camera, home]
             .map(|text| Scene::parse(text, "scene", Path::new(""), &[]).map(|scene| scene.camera).map_err(error));
         (shown.scene.camera, shown.home) = (camera?, home?);
-        shown.object = object.filter(|corners| corners.len() == 6).map(|corners| {
-            let [low, high] = [&corners[..3], &corners[3..]].map(DVec3::from_slice);
-            Extent { low, high }
+        shown.object = object.filter(|numbers| numbers.len() == 4).map(|numbers| {
+            let sphere = DVec4::from_slice(&numbers);
+            Sphere { center: sphere.truncate(), radius: sphere.w }
         });
         Ok(())
     }
@@ -215,14 +214,15 @@ impl Session {
         &mut self,
         scene: Scene,
         (volume, histograms): (Arc<Volume>, Histograms),
-        kept: Option<(Camera, Camera, Option<Extent>)>,
+        kept: Option<(Camera, Camera, Option<Sphere>)>,
     ) -> Result<(), JsValue> {
         let [width, height] = self.size;
         let scene = Scene { image: ImageSettings { width, height, ..scene.image }, ..scene };
         scene.check().map_err(error)?;
         let (camera, home, object) = kept.unwrap_or_else(|| {
-            let object = self.all_around.then(|| scene.extent(&volume, &scene.resolve(&volume))).flatten();
-            (scene.camera, scene.camera, object)
+            let object = self.all_around.then(|| scene.sphere(&volume, &scene.resolve(&volume))).flatten();
+            let camera = scene.camera_for(&volume);
+            (camera, camera, object)
         });
         let shown = Shown { scene: Scene { camera, ..scene }, volume, histograms, home, object };
         self.drawer.set_volume(&shown.volume, &shown.camera(self.size)).await?;
@@ -251,7 +251,7 @@ impl Shown {
     /// The scene for a picture of some width and height.
     fn camera(&self, size: [u32; 2]) -> Scene {
         let [width, height] = size;
-        let camera = self.object.map_or(self.scene.camera, |object| object.fit_all_around(&self.scene.camera, size));
+        let camera = self.object.map_or(self.scene.camera, |object| object.fit(&self.scene.camera, size));
         Scene { camera, image: ImageSettings { width, height, ..self.scene.image }, ..self.scene.clone() }
     }
 

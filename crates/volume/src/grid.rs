@@ -135,7 +135,12 @@ impl Grid {
 
     /// `min(sx, sy, sz)` in world units, of the volume's finest level: the unit of length for opacities and slab widths (SPEC §2).
     pub fn unit(&self) -> f64 {
-        self.finest.unwrap_or(self.spacing).min_element()
+        self.finest_spacing().min_element()
+    }
+
+    /// The spacing of the volume's finest level: the grid's own, if this is not a coarser one.
+    pub fn finest_spacing(&self) -> DVec3 {
+        self.finest.unwrap_or(self.spacing)
     }
 
     /// The grid aspect `ar = s / unit` (§4.2), each component at least 1 if the finest level's spacings are the smallest.

@@ -335,7 +335,7 @@ impl Input {
                 "{name}: --view: found no orientation in the file, allowed: {allowed}"
             )));
         };
-        [scene.camera.direction, scene.camera.up] = orientation.direction_and_up(view.into());
+        scene.camera = scene.camera.looking(orientation.direction_and_up(view.into()));
         Ok(())
     }
 

@@ -251,5 +251,5 @@ fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFun
     scene.check_volume(sample)?;
     check(scene)?;
     scene.check_streamed(volume)?;
-    Ok((scene.classified(sample), scene.resolve(sample)))
+    Ok((scene.settled(sample), scene.resolve(sample)))
 }

@@ -52,7 +52,8 @@ impl BoxedView {
     /// If a setting of the scene is invalid, or not supported for a volume that is streamed.
     pub(super) fn new(volume: StreamedVolume, scene: &Scene, backend: Backend) -> Result<Self, RenderError> {
         check(&volume, scene, backend)?;
-        Ok(Self { volume, scene: scene.clone(), backend })
+        let scene = scene.settled(&volume.sample);
+        Ok(Self { volume, scene, backend })
     }
 
     pub(super) fn backend(&self) -> Backend {
@@ -69,7 +70,7 @@ impl BoxedView {
 
     pub(super) fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
         check(&self.volume, scene, self.backend)?;
-        self.scene = scene.clone();
+        self.scene = scene.settled(&self.volume.sample);
         Ok(())
     }
 

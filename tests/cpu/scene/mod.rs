@@ -30,7 +30,7 @@ fn defaults() {
     let scene = parse(MINIMAL, &[]).unwrap();
     assert_eq!(scene, Scene::new(file("folder/a.nrrd")));
     assert_eq!((scene.spacing, &scene.labels), (None, &None));
-    assert_eq!(scene.camera, Camera { fit: Fit::Object, ..Camera::default() });
+    assert_eq!(scene.camera, Camera { fit: Fit::Object, is_eye_open: true, ..Camera::default() });
     assert_eq!(scene.image, ImageSettings { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] });
     assert_eq!(scene.transfer, TransferSettings::default());
     assert_eq!(scene.shading, Shading::default());
@@ -61,7 +61,12 @@ fn the_default_fit_depends_on_the_files_tables() {
         (camera, &["camera.fit=object"], Fit::Object),
         ("", &["camera.fit=volume"], Fit::Volume),
     ] {
-        assert_eq!(parse(&format!("{volume}{keys}"), sets).unwrap().camera.fit, fit, "{keys} {sets:?}");
+        let camera = parse(&format!("{volume}{keys}"), sets).unwrap().camera;
+        assert_eq!(camera.fit, fit, "{keys} {sets:?}");
+        // The eye is open with these tables missing, unless its direction is stated.
+        let is_bare = !["[camera]", "transfer", "camera.fit"].iter().any(|table| keys.contains(table));
+        let states_direction = sets.iter().any(|set| set.starts_with("camera.direction"));
+        assert_eq!(camera.has_open_eye(), is_bare && !states_direction, "{keys} {sets:?}");
         if keys.is_empty() {
             let sets: Vec<String> = sets.iter().map(|&set| set.to_owned()).collect();
             assert_eq!(Scene::from_volume(file("a.nrrd"), &sets).unwrap().camera.fit, fit, "{sets:?}");
@@ -151,6 +156,7 @@ fn every_key() {
             up: DVec3::new(0.0, 0.0, -2.0),
             center: Some(DVec3::new(1.0, -2.0, 3.5)),
             fit: Fit::Object,
+            is_eye_open: false,
         },
         image: ImageSettings { width: 1, height: 300, background: [1.0, 0.5, 0.0, 0.25] },
         clip: Clip {

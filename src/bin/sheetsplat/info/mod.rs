@@ -77,6 +77,8 @@ struct Info {
     #[serde(serialize_with = "as_map")]
     percentiles: [f64; PERCENTILES.len()],
     frame: Frame,
+    /// Why the camera looks in its direction: the rule by which the volume chose it, or that it is stated.
+    eye: String,
     /// The preset that fits, if any.
     preset: Option<&'static str>,
 }
@@ -85,6 +87,8 @@ struct Info {
 #[derive(Serialize)]
 struct Frame {
     center: [f64; 3],
+    direction: [f64; 3],
+    up: [f64; 3],
     /// The image's height; `None` in perspective.
     height: Option<f64>,
     /// The distance from the eye to the centre; `None` if orthographic.
@@ -93,11 +97,12 @@ struct Frame {
 
 impl Frame {
     fn of(camera: &Camera) -> Self {
-        let center = camera.middle().to_array();
-        match camera.projection {
-            Projection::Orthographic { height } => Self { center, height, distance: None },
-            Projection::Perspective { distance, .. } => Self { center, height: None, distance },
-        }
+        let (height, distance) = match camera.projection {
+            Projection::Orthographic { height } => (height, None),
+            Projection::Perspective { distance, .. } => (None, distance),
+        };
+        let [center, direction, up] = [camera.middle(), camera.direction, camera.up].map(|vector| vector.to_array());
+        Self { center, direction, up, height, distance }
     }
 }
 
@@ -108,6 +113,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     // What is told is about the volume itself, whatever a picture would show of it.
     let opened = input.open_volume(&at_finest_level(&scene), &outputs)?;
     let volume = opened.sample();
+    let eye = if input.view.is_some() { None } else { scene.eye(volume) };
     let scene = input.settled(volume, &scene, Scene::explicit)?;
     let suggested = Preset::suggested(volume);
     let [min, max, mean] = extent_and_mean(volume.values());
@@ -132,6 +138,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         mean,
         percentiles: percentiles.unwrap_or_default().map(f64::from),
         frame: Frame::of(&scene.camera),
+        eye: eye.map_or_else(|| "where it is stated".to_owned(), |eye| eye.to_string()),
         preset: Preset::ALL.iter().find(|(_, preset)| suggested == Some(*preset)).map(|(name, _)| *name),
     };
     let text = if arguments.json {
@@ -214,6 +221,8 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
     };
     let length = length.map_or(String::new(), |length| format!(", {name} {}", short(length)));
     line("frame", format!("center {x}, {y}, {z}{length} {}", info.unit.as_deref().unwrap_or("(no unit)")));
+    let [direction, up] = [info.frame.direction, info.frame.up].map(|vector| vector.map(short).join(", "));
+    line("eye", format!("{}: direction {direction}, up {up}", info.eye));
     line("preset", info.preset.unwrap_or("none fits; the transfer function follows the values").to_owned());
     for (&(_, name), &value) in PERCENTILES.iter().zip(&info.percentiles) {
         line(&format!("{name:>9} %"), short(value));

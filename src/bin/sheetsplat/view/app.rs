@@ -13,7 +13,7 @@ use eframe::egui::{
 use glam::DVec2;
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{ImageSettings, Scene};
-use sheetsplat::settings::{Camera, Extent, TransferFunction, navigation};
+use sheetsplat::settings::{Camera, Sphere, TransferFunction, navigation};
 use sheetsplat::volume::Volume;
 
 use super::arguments::{Arguments, Outcome};
@@ -45,7 +45,7 @@ pub(super) struct App {
     /// The scene's original camera.
     home: Camera,
     /// What a camera that fits the object shows.
-    object: Option<Extent>,
+    object: Option<Sphere>,
     editor: Editor,
     histogram: Histogram,
     guest: Guest,
@@ -82,7 +82,7 @@ impl App {
         let Some(host) = &context.wgpu_render_state else {
             return Err(Failure::Other("the window has no wgpu device".to_owned()));
         };
-        let object = scene.extent(&volume, &scene.resolve(&volume));
+        let object = scene.sphere(&volume, &scene.resolve(&volume));
         let guest = Guest::new(host, volume, &scene, &arguments.input.name)?;
         // The panel shows the choice, and the user may change it.
         scene.splatting.classification = guest.classification();
@@ -180,7 +180,7 @@ impl App {
     /// The camera for an image of `size` pixels, with the object whole from every direction where the scene leaves that open.
     fn camera(&self, size: [u32; 2]) -> Camera {
         let camera = &self.scene.camera;
-        self.object.map_or(*camera, |object| object.fit_all_around(camera, size))
+        self.object.map_or(*camera, |object| object.fit(camera, size))
     }
 
     /// Handles orbit, zoom and pan. Returns whether the pointer is changing the picture.
