@@ -139,11 +139,7 @@ impl Scene {
     }
 
     /// `fit` gives the camera for a transfer function and an image's size, or `None` if it stays.
-    fn explicit_by(
-        &self,
-        volume: &Volume,
-        fit: impl Fn(&Self, &TransferFunction, [u32; 2]) -> Option<Camera>,
-    ) -> Self {
+    fn explicit_by(&self, volume: &Volume, fit: impl Fn(&Self, &TransferFunction, [u32; 2]) -> Option<Camera>) -> Self {
         let settled = self.settled(volume);
         let ImageSettings { width, height, .. } = self.image;
         let camera = fit(&settled, &self.resolve(volume), [width, height]).unwrap_or(settled.camera);

@@ -7,7 +7,7 @@ use crate::settings::camera::{Camera, Projection};
 use crate::volume::Grid;
 
 /// The maximum elevation of the camera in degrees over the plane perpendicular to `up`: at 90 the screen has no up.
-const MAX_ELEVATION: f64 = 89.0;
+pub const MAX_ELEVATION: f64 = 89.0;
 
 /// The range of heights for zooming, in diameters of the volume.
 const HEIGHTS: [f64; 2] = [1e-3, 1e2];

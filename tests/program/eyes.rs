@@ -20,7 +20,8 @@ fn eye(folder: &Folder, arguments: &str) -> ([[f64; 3]; 2], String) {
 fn write(folder: &Folder, dims: [usize; 3], geometry: &str) {
     let [nx, ny, nz] = dims;
     let mut header = String::new();
-    writeln!(header, "NRRD0004\ntype: uchar\ndimension: 3\nsizes: {nx} {ny} {nz}\nencoding: raw\n{geometry}\n").unwrap();
+    writeln!(header, "NRRD0004\ntype: uchar\ndimension: 3\nsizes: {nx} {ny} {nz}\nencoding: raw\n{geometry}\n")
+        .unwrap();
     let values = (0..nx * ny * nz).map(|at| (at * 37 % 251) as u8);
     folder.write("a.nrrd", header.into_bytes().into_iter().chain(values).collect::<Vec<u8>>());
 }
@@ -77,7 +78,12 @@ fn files_tell_where_the_camera_stands() {
     write(&folder, [8, 8, 8], "space: 3D-right-handed\nspace directions: (4,0,0) (0,2,0) (0,0,4)");
     assert_eye(&folder, "a.nrrd", aside(Y, Z), "the extent along y");
     write(&folder, [8, 8, 5], plain);
-    assert_eye(&folder, "a.nrrd", aside(minus(Y), Z), "states no orientation (if the object lies otherwise, state camera.up)");
+    assert_eye(
+        &folder,
+        "a.nrrd",
+        aside(minus(Y), Z),
+        "states no orientation (if the object lies otherwise, state camera.up)",
+    );
     assert_eye(&folder, "a.nrrd --set camera.fit=volume --set preset=mip", aside(minus(Y), Z), "no orientation");
 
     // What is stated.
@@ -122,7 +128,8 @@ fn pictures_are_drawn_from_there() {
     let stated = folder.pixels(&format!("builtin:nerve:24 {size} --set camera.direction=[{x},{y},{z}]"));
     assert_eq!(stated, folder.pixels(&format!("builtin:nerve:24 {size}")));
     for backend in ["cpu", "gpu", "reference"] {
-        let movie = format!("builtin:nerve:24 --backend {backend} --set image={{width=40,height=30}} --set camera.fit=volume");
+        let movie =
+            format!("builtin:nerve:24 --backend {backend} --set image={{width=40,height=30}} --set camera.fit=volume");
         folder.run(&format!("orbit {movie} --count 4 -o {backend}-%d.npy")).assert_success();
         assert_eq!(folder.read_npy(&format!("{backend}-0.npy")), folder.pixels(&movie), "{backend}");
     }

@@ -32,6 +32,35 @@ fn size_and_background_are_short_for_keys() {
     }
 }
 
+/// The eye goes round the object by the right hand about up, and then up.
+#[test]
+fn azimuth_and_elevation_turn_the_eye() {
+    let folder = Folder::new();
+    let scene = |flags: &str| {
+        folder
+            .run(&format!("render {CUBE} --size 8 --backend cpu {flags} -o out.png --save-scene out.toml"))
+            .assert_success();
+        let saved: toml::Table = String::from_utf8(folder.read("out.toml")).unwrap().parse().unwrap();
+        let number = |value: &toml::Value| value.as_float().or(value.as_integer().map(|whole| whole as f64)).unwrap();
+        let direction: Vec<f64> = saved["camera"]["direction"].as_array().unwrap().iter().map(number).collect();
+        DVec3::from_slice(&direction).normalize()
+    };
+    let assert_near = |found: DVec3, expected: DVec3| assert!(found.abs_diff_eq(expected, 1e-9), "{found} {expected}");
+    let front = "--set camera.direction=[0,1,0]";
+    assert_near(scene(&format!("{front} --azimuth 90")), DVec3::NEG_X);
+    assert_near(scene(&format!("{front} --elevation 30")), DVec3::new(0.0, 0.75_f64.sqrt(), -0.5));
+    assert_near(scene(&format!("{front} --azimuth -90 --elevation -30")), DVec3::new(0.75_f64.sqrt(), 0.0, 0.5));
+    // From where the eye is by itself.
+    let own = scene("");
+    let turned = scene("--azimuth 40");
+    assert!((own.dot(turned) - 1.0).abs() > 0.1 && (own.z - turned.z).abs() < 1e-9, "{own} {turned}");
+    let above = folder.run(&format!("render {CUBE} {front} --elevation 90 -o out.png"));
+    above.assert_failure(2, &["--elevation: found 90", "at most 89"]);
+    folder
+        .run(&format!("render {CUBE} --azimuth north -o out.png"))
+        .assert_failure(2, &["--azimuth", "a finite number"]);
+}
+
 #[test]
 fn a_misspelt_key_suggests_the_key() {
     let folder = Folder::new();

@@ -6,11 +6,13 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use glam::DVec2;
 use sheetsplat::RenderError;
 use sheetsplat::appearance::{Colormap, Preset};
 use sheetsplat::headless::{Backend, Error, Headless, HeadlessOptions};
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{OpenVolume, Scene, SceneError, VolumeSource};
+use sheetsplat::settings::navigation;
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::{self, Orientation, ReadOptions, StreamedVolume, Volume};
 
@@ -58,6 +60,12 @@ pub(crate) struct Input {
     /// and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
     pub(crate) view: Option<View>,
+    /// Degrees by which the eye goes to the right about camera.up, from where it would be.
+    #[arg(long, value_name = "DEG", value_parser = parse_degrees, allow_negative_numbers = true)]
+    azimuth: Option<f64>,
+    /// Degrees by which the eye goes up, after --azimuth.
+    #[arg(long, value_name = "DEG", value_parser = parse_degrees, allow_negative_numbers = true)]
+    elevation: Option<f64>,
     /// What draws: a GPU by its driver, the CPU's cores without one, the slow f64 evaluation that both are tested against, or a GPU if there is
     /// one and else the CPU. --adapter, --profile and a scene's rasterizer mean the GPU.
     #[arg(
@@ -326,8 +334,27 @@ impl Input {
         Ok(explicit(&scene, volume))
     }
 
-    /// Turns the scene's camera to the side of the patient given by --view.
+    /// Turns the scene's camera to the side of the patient given by --view, and by --azimuth and --elevation.
     pub(crate) fn look_at(&self, volume: &Volume, scene: &mut Scene) -> Result<(), Failure> {
+        self.look_at_side(volume, scene)?;
+        let [azimuth, elevation] = [self.azimuth, self.elevation].map(Option::unwrap_or_default);
+        if azimuth == 0.0 && elevation == 0.0 {
+            return Ok(());
+        }
+        let mut camera = scene.camera_for(volume).turned(azimuth);
+        let above = navigation::elevation(&camera) + elevation;
+        if above.abs() > navigation::MAX_ELEVATION {
+            let most = navigation::MAX_ELEVATION;
+            let found =
+                format!("--elevation: found {elevation}, which puts the eye {above:.1} degrees above the level");
+            return Err(Failure::Input(format!("{found}, allowed: at most {most} above or below it")));
+        }
+        navigation::orbit(&mut camera, DVec2::new(0.0, elevation));
+        scene.camera = camera;
+        Ok(())
+    }
+
+    fn look_at_side(&self, volume: &Volume, scene: &mut Scene) -> Result<(), Failure> {
         let (Some(view), name) = (self.view, &self.name) else { return Ok(()) };
         let Some(orientation) = volume.orientation() else {
             let allowed = "a volume whose file says how the patient lies, or --set camera.direction and camera.up";
