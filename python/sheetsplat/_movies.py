@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from . import _native as native
@@ -41,7 +41,7 @@ def writer(output: str, count: int, fps: float) -> Callable[[Iterator[Image]], N
 
     def write(pictures: Iterator[Image]) -> None:
         # Pictures of 8 bits take a quarter of the memory.
-        inputs: list[native.Inputs] = []
+        inputs: Sequence[native.Inputs] = ()
         frames = []
         for picture in pictures:
             inputs = picture._inputs

@@ -95,13 +95,15 @@ def _unmasked(values: NDArray[Any], name: str) -> tuple[NDArray[Any], int]:
 
     if not isinstance(values, np.ma.MaskedArray):
         return values, 0
-    masked = int(np.ma.count_masked(values))
+    mask = np.ma.getmaskarray(values)
+    masked = int(np.count_nonzero(mask))
     if masked == 0:
         return np.asarray(values), 0
     if name == "labels":
         raise refused(name, f"{masked} masked ones", "labels without a mask: labels.filled(0) has label 0 there")
-    numbers = values if values.dtype.kind == "f" else values.astype(np.float32)
-    return np.asarray(numbers.filled(np.nan)), masked
+    numbers = np.array(values.data, dtype=values.dtype if values.dtype.kind == "f" else np.float32)
+    numbers[mask] = np.nan
+    return numbers, masked
 
 
 def _bytes(source: Any) -> int:

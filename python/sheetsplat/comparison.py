@@ -62,7 +62,7 @@ class Comparison:
 
     def difference_image(self) -> Image:
         """Black for no difference, grey within the tolerance, red to yellow beyond it."""
-        return Image._of(self._native.difference_image(), {}, None, [])
+        return Image._of(self._native.difference_image(), {}, None)
 
     def __str__(self) -> str:
         return str(self._native)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from . import _native
@@ -47,14 +48,14 @@ class Image:
     _array: NDArray[np.float32]
     _made_on: tuple[str, str] | None
     #: What was read for it, none of which it may replace.
-    _inputs: list[_native.Inputs]
+    _inputs: Sequence[_native.Inputs]
 
     def __init__(self, array: Any) -> None:
         if isinstance(array, Image):
             self._array, self.stats, self._made_on = array._array, array.stats, array._made_on
             self._inputs = array._inputs
             return
-        self._array, self.stats, self._made_on, self._inputs = _premultiplied(array), {}, None, []
+        self._array, self.stats, self._made_on, self._inputs = _premultiplied(array), {}, None, ()
 
     @classmethod
     def _of(
@@ -62,7 +63,7 @@ class Image:
         array: NDArray[np.float32],
         stats: dict[str, Any],
         made_on: tuple[str, str] | None,
-        inputs: list[_native.Inputs],
+        inputs: Sequence[_native.Inputs] = (),
     ) -> Image:
         image = cls.__new__(cls)
         image._array, image.stats, image._made_on, image._inputs = array, stats, made_on, inputs
@@ -90,7 +91,7 @@ class Image:
             If it holds no picture.
         """
         array, made_on = _native.open_image(path)
-        return cls._of(array, {}, made_on, [])
+        return cls._of(array, {}, made_on)
 
     @property
     def width(self) -> int:
@@ -152,7 +153,7 @@ class Image:
 
     def __reduce__(self) -> Any:
         # What was read for it bears on this process alone.
-        return Image._of, (self._array, self.stats, self._made_on, [])
+        return Image._of, (self._array, self.stats, self._made_on)
 
     def _repr_png_(self) -> bytes:
         return _native.encode(self._array, 8)

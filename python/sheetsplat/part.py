@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from . import _native as native
@@ -25,13 +25,13 @@ class Part:
     stats: dict[str, Any]
     _native: native.Part
     #: What this process read for it, none of which it may replace.
-    _inputs: list[native.Inputs]
+    _inputs: Sequence[native.Inputs]
 
     def __init__(self) -> None:
         raise TypeError("parts are made by View.part and Part.open")
 
     @classmethod
-    def _of(cls, drawn: native.Part, stats: dict[str, Any], inputs: list[native.Inputs]) -> Part:
+    def _of(cls, drawn: native.Part, stats: dict[str, Any], inputs: Sequence[native.Inputs] = ()) -> Part:
         part = cls.__new__(cls)
         part._native, part.stats, part._inputs = drawn, stats, inputs
         return part
@@ -45,7 +45,7 @@ class Part:
         path : path
             An EXR or NPZ file.
         """
-        return cls._of(native.Part.open(path), {}, [])
+        return cls._of(native.Part.open(path), {})
 
     @classmethod
     def join(cls, parts: Iterable[Part]) -> Part:
@@ -101,7 +101,7 @@ class Part:
 
 
 def _restored(name: str, data: bytes, stats: dict[str, Any]) -> Part:
-    return Part._of(native.Part.from_bytes(name, data), stats, [])
+    return Part._of(native.Part.from_bytes(name, data), stats)
 
 
 def _inputs(parts: list[Part]) -> list[native.Inputs]:

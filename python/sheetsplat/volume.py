@@ -28,13 +28,15 @@ class Volume:
     ----------
     source : array, SimpleITK or nibabel image, path or Volume
         An array ``[z, y, x]`` of any integer or floating-point type, with any strides, or anything with ``__array__``
-        (xarray, dask, zarr, torch on the CPU). Its values are copied as ``float32``; NaN and infinite ones, and those
-        beyond the range of ``float32``, are holes, which are not drawn. An image of SimpleITK or nibabel, which also gives spacing and orientation. A path of a volume file or
-        of a folder of slices. Or ``"builtin:NAME"``.
+        (dask, zarr, torch on the CPU). Its values are copied as ``float32``; NaN, infinite and masked ones, and those
+        beyond the range of ``float32``, are holes, which are not drawn. A ``DataArray`` of xarray, whose dims are ordered by
+        their names (z, y and x, or depth, row and column) and whose coordinates give spacing and unit. An image of
+        SimpleITK or nibabel, which also gives spacing, orientation and unit. A path of a volume file or of a folder of
+        slices. Or ``"builtin:NAME"``.
     spacing : float or three floats, optional
         World units between voxels, in the order of an array's axes: z, y, x. Replaces the source's own.
     labels : array, optional
-        The segment of each voxel, whole numbers from 0 to 65535, of the same shape.
+        The segment of each voxel, whole numbers from 0 to 65535, of the same shape, with the same order of axes.
     channel_axis : int, optional
         The axis of an array of four dimensions along which channels follow one another; the others are z, y, x.
     memory : int or str, optional
@@ -48,7 +50,7 @@ class Volume:
         read whose values cannot be seen.
     channel, time, level : int, optional
         The channel, the time and the level of a path that holds several, counted from 0: all channels, the first time
-        and the finest level without them.
+        and the finest level without them. The channel and the time also of a ``DataArray`` with dims c (channel) and t (time).
 
     Examples
     --------

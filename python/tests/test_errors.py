@@ -3,13 +3,15 @@
 import os
 import pathlib
 import pickle
+import subprocess
+import sys
 from typing import Any
 
 import numpy as np
 import pytest
 
 import sheetsplat
-from sheetsplat import DeviceError, FileError, GoldenError, ImageError, Scene, SceneError, View, errors
+from sheetsplat import DeviceError, FileError, GoldenError, ImageError, Scene, SceneError, View, Volume, VolumeError, errors
 
 SMALL = {"width": 16, "height": 16}
 HEAD = "builtin:head:16"
@@ -18,7 +20,7 @@ PICTURE = np.zeros((4, 4, 3), np.uint8)
 
 def test_every_exception_is_a_value_error_or_an_os_error() -> None:
     kinds = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, errors.SheetsplatError)]
-    assert {kind.__name__ for kind in kinds} - {"_Refused"} == set(errors.__all__)
+    assert {kind.__name__ for kind in kinds} - {"_Refused"} == set(errors.__all__) - {"SheetsplatWarning"}
     for kind in kinds:
         if kind is not errors.SheetsplatError:
             assert issubclass(kind, ValueError) != issubclass(kind, OSError), kind
@@ -163,3 +165,55 @@ def test_a_device_error_of_a_real_render() -> None:
     with pytest.raises(DeviceError, match="nobody's adapter") as caught:
         sheetsplat.render(HEAD, backend="gpu", adapter="nobody's adapter", image=SMALL)
     assert isinstance(caught.value, OSError) and isinstance(caught.value, sheetsplat.SheetsplatError)
+
+
+def test_settings_are_not_assigned() -> None:
+    """An attribute that a class lacks would change nothing, silently."""
+    view = View(HEAD, image=SMALL)
+    view.scene = view.scene.replace(preset="mip")
+    part = view.part()
+    for thing in (view, view.scene, view.volume, view.render(), part):
+        for name in ("camera", "x", "preset"):
+            with pytest.raises(AttributeError, match=name):
+                setattr(thing, name, 1)
+    with pytest.raises(AttributeError):
+        view.volume = view.volume  # type: ignore[misc]
+
+
+def test_errors_keep_the_order_of_the_axes() -> None:
+    """z, y, x, as in the array; files have them the other way round."""
+    values = np.zeros((2, 3, 4))
+    with pytest.raises(VolumeError, match=r"sizes: found labels of 2×3×5 voxels, allowed: 2×3×4, as the values along z, y and x"):
+        Volume(values, labels=np.zeros((2, 3, 5), int))
+    for make in (lambda spacing: Volume(values, spacing=spacing), lambda spacing: Volume(Volume(values), spacing=spacing)):
+        with pytest.raises(VolumeError, match=r"spacing\[0\]: found -1") as caught:
+            make((-1, 2, 3))
+        assert caught.value.key == "spacing[0]"
+        with pytest.raises(VolumeError, match=r"spacing: found \[100000, 2, 1\]"):
+            make((100000, 2, 1))
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits the memory of a process")
+def test_a_forked_process_without_threads_raises_an_error() -> None:
+    code = """
+import os, resource
+import sheetsplat
+
+def size():
+    return int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+
+pid = os.fork()
+if pid == 0:
+    # Too little for the stack of one more thread.
+    resource.setrlimit(resource.RLIMIT_AS, (size() + (1 << 20), resource.RLIM_INFINITY))
+    try:
+        sheetsplat.Volume("builtin:cube:4")
+    except sheetsplat.DeviceError as error:
+        os._exit(0 if "threads: found" in str(error) else 1)
+    except BaseException:
+        os._exit(2)
+    os._exit(3)
+assert os.waitpid(pid, 0)[1] == 0
+"""
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert result.returncode == 0, result.stderr

@@ -49,6 +49,9 @@ def test_goldens(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> 
     text = page.read_text()
     for name in left[:3]:
         assert f'src="test_it/{name}"' in text
+    # To list the tests compares nothing.
+    pytester.runpytest_subprocess("-p", "no:cacheprovider", "--collect-only")
+    assert page.read_text() == text
     run(pytester).assert_outcomes(passed=2)
     assert not page.exists() and not (page.parent / "test_it" / "head-actual.png").exists()
 

@@ -24,6 +24,8 @@ def use(values: NDArray[np.int16]) -> None:
     assert_type(sheetsplat.compare(values, values), Comparison)
     assert_type(sheetsplat.orbit(values, "turn.gif"), Iterator[Image] | None)
     assert_type(sheetsplat.info("head.nrrd", spacing=2), dict[str, Any])
+    assert_type(volume.unit, str | None)
+    issubclass(sheetsplat.SheetsplatWarning, UserWarning)
     try:
         scene.save("scene.toml")
     except sheetsplat.FileError as error:
@@ -33,5 +35,6 @@ def use(values: NDArray[np.int16]) -> None:
     # Each of these is an error, which `--strict` reports if it is none.
     View(volume, backend=5)  # type: ignore[arg-type]
     view.render().save("a.png", depth="8")  # type: ignore[arg-type]
+    view.camera = scene  # type: ignore[attr-defined]
     Volume()  # type: ignore[call-arg]
     sheetsplat.rendre(values)  # type: ignore[attr-defined]
