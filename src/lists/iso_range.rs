@@ -92,14 +92,24 @@ impl ValueSet {
         Self { ranges: merged }
     }
 
+    /// The common values, by one walk over both lists.
     fn intersection(&self, other: &Self) -> Self {
-        let pairs = self.ranges.iter().flat_map(|a| other.ranges.iter().map(move |b| (a, b)));
-        Self::of_ranges(pairs.map(|(a, b)| a.start.max(b.start)..a.end.min(b.end)).collect())
+        let (mut ranges, mut at, mut at_other) = (Vec::new(), 0, 0);
+        while let (Some(a), Some(b)) = (self.ranges.get(at), other.ranges.get(at_other)) {
+            ranges.push(a.start.max(b.start)..a.end.min(b.end));
+            if a.end < b.end { at += 1 } else { at_other += 1 }
+        }
+        Self::of_ranges(ranges)
     }
 
     /// The values in either set.
     pub fn union(&self, other: &Self) -> Self {
         Self::of_ranges([self.ranges.clone(), other.ranges.clone()].concat())
+    }
+
+    /// The values in any of several sets, whose ranges are sorted once.
+    pub fn union_of(sets: impl IntoIterator<Item = Self>) -> Self {
+        Self::of_ranges(sets.into_iter().flat_map(|set| set.ranges).collect())
     }
 
     /// The values in exactly one of the two sets.
@@ -120,17 +130,27 @@ impl ValueSet {
     /// Whether any value from `min` to `max` is in the set.
     pub fn meets(&self, min: f32, max: f32) -> bool {
         let (first, last) = (ordinal(min), ordinal(max));
-        self.ranges.iter().any(|range| range.start <= last && first < range.end)
+        self.ends_behind(first).is_some_and(|range| range.start <= last)
+    }
+
+    /// The first range that ends behind an ordinal.
+    fn ends_behind(&self, ordinal: u32) -> Option<&Range<u32>> {
+        self.ranges.get(self.ranges.partition_point(|range| range.end <= ordinal))
     }
 
     /// Whether a value is in the set.
     pub fn contains(&self, value: f32) -> bool {
         let at = ordinal(value);
-        self.ranges.iter().any(|range| range.contains(&at))
+        self.ends_behind(at).is_some_and(|range| range.start <= at)
     }
 
     /// Sets the flags of those of as many values that are in the set.
     pub fn flag(&self, values: ValueSlice, flags: &mut [bool]) {
+        /// The most ranges for which comparing all values with each is faster than a search for each value.
+        const FEW: usize = 8;
+        if self.ranges.len() > FEW {
+            return values.flag(flags, |value| self.contains(value));
+        }
         for range in &self.ranges {
             let (start, length) = (range.start, range.end - range.start);
             values.flag(flags, |value| ordinal(value).wrapping_sub(start) < length);

@@ -164,7 +164,8 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
         return Ok(None);
     }
     if let Some(path) = &options.index {
-        let text = access.text(path)?.map_err(|source| VolumeError::io(path, source))?;
+        // The text, and up to five times as many bytes of ranges.
+        let text = access.text(path, memory / 8)?.map_err(|source| VolumeError::io(path, source))?;
         let origin = path.display().to_string();
         StreamedVolume::index((&mut first, &mut further), StoreIndex::decode(&origin, &text)?, &origin)?;
     }
