@@ -188,6 +188,26 @@ mod tests {
         assert!(ordinal(f32::NAN) > END);
     }
 
+    /// By pairs of ranges these would take 80 GB.
+    #[test]
+    fn sets_of_many_ranges_are_walked_through_once() {
+        let ranges = |offset: f64| (0..100_000).map(move |at| [f64::from(at) + offset, f64::from(at) + offset + 0.25]);
+        let set = |offset: f64| ValueSet::of(&transfer(&[(0.0, 1.0)], Some(&ranges(offset).collect::<Vec<_>>())));
+        let [a, b] = [0.0, 0.125].map(set);
+        let (difference, union) = (a.symmetric_difference(&b), ValueSet::union_of([a.clone(), b]));
+        assert_eq!((difference.ranges().len(), union.ranges().len()), (200_000, 100_000));
+        let middle = |share: f32| 50_000.0 + share;
+        assert_eq!([0.0, 0.2, 0.3, 0.5].map(|share| union.contains(middle(share))), [true, true, true, false]);
+        assert_eq!([0.0, 0.2, 0.3, 0.5].map(|share| difference.contains(middle(share))), [true, false, true, false]);
+        assert!(a.meets(middle(0.3), middle(1.0)) && !a.meets(middle(0.3), middle(0.9)));
+        let values: Vec<f32> = (0..1000).map(|at| 70_000.0 + at as f32 / 16.0).collect();
+        let mut flags = vec![false; values.len()];
+        a.flag((&values).into(), &mut flags);
+        assert!(
+            values.iter().zip(flags).all(|(&value, flag)| flag == a.contains(value) && flag == (value.fract() <= 0.25))
+        );
+    }
+
     #[test]
     fn a_value_is_in_the_set_where_it_has_an_opacity() {
         let cases = [

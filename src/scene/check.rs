@@ -98,7 +98,10 @@ impl Scene {
     /// Checks that the tables of all channels together are not too long.
     pub(super) fn check_pieces(&self) -> Result<(), SettingError> {
         let further = self.further.iter().map(|channel| &channel.transfer);
-        check_pieces(&self.transfer_table(0), std::iter::once(&self.transfer).chain(further).map(TransferSettings::parts))
+        check_pieces(
+            &self.transfer_table(0),
+            std::iter::once(&self.transfer).chain(further).map(TransferSettings::parts),
+        )
     }
 
     /// Checks that a volume has the channels that the scene has tables for, and the labels or palettes that these need.

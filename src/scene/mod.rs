@@ -9,7 +9,7 @@ mod image_settings;
 mod level;
 mod load;
 pub(crate) mod names;
-mod open;
+pub(crate) mod open;
 mod overrides;
 mod reader;
 mod source;
@@ -261,7 +261,10 @@ impl Scene {
             let (key, found) = ("splatting.classification", "\"after\" with preset = \"labels\"");
             return Err(origins.invalid(key, &["preset"], found, "\"before\" with it"));
         }
-        scene.check_pieces().map_err(|error| origins.refused(error))?;
+        // Tables too long to be quoted are counted.
+        scene
+            .check_pieces()
+            .map_err(|error| origins.invalid(&error.key, &[], error.found.to_string(), error.allowed))?;
         Ok(scene)
     }
 }

@@ -196,7 +196,7 @@ const MAX_PIECES: usize = 1 << 19;
 /// Checks the number of entries of a list.
 fn check_length(key: &str, count: usize, most: usize) -> Result<(), SettingError> {
     if count > most {
-        return Err(SettingError::new(key, format!("{count} entries"), format!("at most {most}")));
+        return Err(SettingError::new(key, format!("{count} entries"), format!("at most {most} entries, not {count}")));
     }
     Ok(())
 }
@@ -226,7 +226,11 @@ pub(crate) fn check_pieces<'a>(table: &str, channels: impl Iterator<Item = Parts
     let pieces = channels.map(of_channel).fold(0_usize, usize::saturating_add);
     if pieces > MAX_PIECES {
         let found = format!("tables of {pieces} pieces, those of labels included");
-        return Err(SettingError::new(table, found, format!("at most {MAX_PIECES}: fewer control points, iso-ranges or labels")));
+        return Err(SettingError::new(
+            table,
+            found,
+            format!("at most {MAX_PIECES}: fewer control points, iso-ranges or labels"),
+        ));
     }
     Ok(())
 }

@@ -5,6 +5,7 @@ use std::fmt::{self, Debug, Display, Formatter};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::string::FromUtf8Error;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError};
 
@@ -277,12 +278,15 @@ impl Access {
         let bytes = match bytes.map_err(VolumeError::into_parts) {
             Ok(bytes) => bytes,
             Err(Ok((_, error))) => return Ok(Err(error)),
-            Err(Err([origin, field, found, allowed])) => return Err(VolumeError::invalid(origin, field, found, allowed)),
+            Err(Err([origin, field, found, allowed])) => {
+                return Err(VolumeError::invalid(origin, field, found, allowed));
+            }
         };
         if bytes.len() as u64 > most {
             return Err(invalid(path, "size", format!("more than {most} bytes"), format!("at most {most} bytes")));
         }
-        Ok(String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error.utf8_error())))
+        let not_utf8 = |error: FromUtf8Error| format!("found text that is not UTF-8: {}", error.utf8_error());
+        Ok(String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, not_utf8(error))))
     }
 
     /// Checks that a file is not one that will be written.
