@@ -175,10 +175,11 @@ pub use wgpu;
 /// without notice.
 #[doc(hidden)]
 pub mod internals {
-    pub use sheetsplat_volume::internals::{check_spacing, plain, plain_lines, plain_whole, unit};
+    pub use sheetsplat_volume::internals::{check_spacing, identity, plain, plain_lines, plain_whole, unit};
 
     pub use crate::geometry::{footprint, grid_warp, means, plane_geometry, slab, view_geometry};
     pub use crate::lists::{brick, brick_union, bucket, classify, iso_range, patch_bins, quad_plan, value_list};
+    pub use crate::part::fingerprint::fingerprint;
     pub use crate::settings::camera::{Eye, ViewBasis};
     pub use crate::settings::clip::ClippedVoxels;
     pub use crate::settings::shading::MIN_GRADIENT;

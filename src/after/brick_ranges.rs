@@ -116,7 +116,7 @@ impl BrickRanges {
 pub fn values_of(volume: &Volume, transfer: &TransferFunction) -> ValueSet {
     let labels = volume.labels().map(|_| transfer.labels.keys()).into_iter().flatten();
     let tables = labels.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
-    tables.fold(ValueSet::default(), |all, tables| all.union(&values_between(&tables)))
+    ValueSet::union_of(tables.map(|tables| values_between(&tables)))
 }
 
 /// The values that can take part under some tables, with the `f32`s around the ends of iso-ranges: a field passes through values that no voxel has.

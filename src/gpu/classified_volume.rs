@@ -299,9 +299,9 @@ impl ClassifiedVolume {
         labels.sort_unstable();
         labels.dedup();
         // Voxels with other labels are examined too, without effect.
-        let changed = (labels.into_iter())
-            .map(|label| changed_values(&self.transfer.tables(label), &transfer.tables(label)))
-            .fold(ValueSet::default(), |all, values| all.union(&values));
+        let changed = ValueSet::union_of(
+            (labels.into_iter()).map(|label| changed_values(&self.transfer.tables(label), &transfer.tables(label))),
+        );
         let candidates = if changed.ranges().is_empty() {
             Vec::new()
         } else {

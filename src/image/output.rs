@@ -1,7 +1,7 @@
 //! Output files: a regular file appears whole or not at all; pipes and devices are written directly.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, Metadata, OpenOptions, Permissions};
+use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -26,8 +26,8 @@ pub fn remove_temporary() -> impl Sized {
 
 /// What a path leads to once links are followed.
 pub enum Target {
-    /// A regular file, and its permissions if it exists.
-    Regular(PathBuf, Option<Permissions>),
+    /// A regular file, and its owner and permissions if it exists.
+    Regular(PathBuf, Option<Metadata>),
     /// A pipe or a device.
     Stream(PathBuf),
     /// What standard output or standard error is connected to.
@@ -57,7 +57,7 @@ impl Target {
         if metadata.is_file() {
             // A rename would replace the file even without permission to write it.
             OpenOptions::new().write(true).open(path)?;
-            return Ok(Self::Regular(fs::canonicalize(path)?, Some(metadata.permissions())));
+            return Ok(Self::Regular(fs::canonicalize(path)?, Some(metadata)));
         }
         if is_socket(&metadata) {
             let message = "found a socket, allowed: a regular file, a pipe or a device";
@@ -71,13 +71,21 @@ impl Target {
         !matches!(self, Self::Regular(..))
     }
 
+    /// Checks that the folder of a regular file takes new files, before a long render.
+    ///
+    /// # Errors
+    /// The operating system's error.
+    pub fn check_folder(self) -> io::Result<()> {
+        if self.is_stream() { Ok(()) } else { self.create().map(|_| ()) }
+    }
+
     /// Opens a pipe or a device, which may wait for its reader, or creates a temporary file beside a regular file.
     ///
     /// # Errors
     /// The operating system's error.
     pub fn create(self) -> io::Result<Output> {
         match self {
-            Self::Regular(path, permissions) => Output::aside(path, permissions),
+            Self::Regular(path, replaced) => Output::aside(path, replaced.as_ref()),
             Self::Stream(path) => Ok(Output { file: OpenOptions::new().write(true).open(path)?, aside: None }),
             Self::Standard(file) => Ok(Output { file, aside: None }),
         }
@@ -97,30 +105,62 @@ struct Aside {
 }
 
 impl Output {
-    fn aside(target: PathBuf, permissions: Option<Permissions>) -> io::Result<Self> {
+    fn aside(target: PathBuf, replaced: Option<&Metadata>) -> io::Result<Self> {
         let mut builder = tempfile::Builder::new();
         // Temporary files are private by default; an image is as readable as any file the user makes, or as the one it replaces.
         #[cfg(unix)]
-        builder.permissions(permissions.clone().unwrap_or(std::os::unix::fs::PermissionsExt::from_mode(0o666)));
+        builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(replaced.map_or(0o666, mode)));
         let mut all = temporary();
         let (file, path) = builder.prefix(".sheetsplat-").tempfile_in(folder(&target))?.into_parts();
         let aside = Aside { temporary: path.to_path_buf(), target };
         all.insert(aside.temporary.clone(), path);
         drop(all);
         let output = Self { file, aside: Some(aside) };
-        if let Some(permissions) = permissions {
-            // The process's umask may have removed some permissions.
-            output.file.set_permissions(permissions)?;
+        if let Some(replaced) = replaced {
+            output.take_after(replaced)?;
         }
         Ok(output)
     }
 
-    /// Renames the temporary files of completely written outputs to their own names: all of them or none.
+    /// Gives the file the owner and group of the one that it replaces, as far as the user may, and its permissions.
+    #[cfg(unix)]
+    fn take_after(&self, replaced: &Metadata) -> io::Result<()> {
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, fchown};
+        let own = self.file.metadata()?;
+        if (own.uid(), own.gid()) != (replaced.uid(), replaced.gid()) {
+            // Only the superuser may give files away; a group may be one of the user's.
+            let both = fchown(&self.file, Some(replaced.uid()), Some(replaced.gid()));
+            _ = both.or_else(|_| fchown(&self.file, None, Some(replaced.gid())));
+        }
+        // The process's umask may have removed some permissions.
+        self.file.set_permissions(PermissionsExt::from_mode(mode(replaced)))
+    }
+
+    #[cfg(not(unix))]
+    fn take_after(&self, replaced: &Metadata) -> io::Result<()> {
+        self.file.set_permissions(replaced.permissions())
+    }
+
+    /// Waits until the bytes are on the disk, so that no crash leaves the file's name without them.
+    fn sync(&self) -> io::Result<()> {
+        match self.file.sync_all() {
+            // Some file systems have nothing to wait for.
+            Err(error) if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => Ok(()),
+            done => done,
+        }
+    }
+
+    /// Renames the temporary files of completely written outputs, once they are on the disk, to their own names: all of them or none.
     ///
     /// # Errors
     /// The path of an output that cannot be renamed, and the operating system's error. The renames before it are undone, which restores
     /// the files they replaced.
     pub fn commit(outputs: Vec<Self>) -> Result<(), (PathBuf, io::Error)> {
+        for output in &outputs {
+            if let Some(aside) = &output.aside {
+                output.sync().map_err(|error| (aside.target.clone(), error))?;
+            }
+        }
         let mut all = temporary();
         let mut renamed = Vec::new();
         for Aside { temporary, target } in outputs.iter().filter_map(|output| output.aside.as_ref()) {
@@ -137,6 +177,12 @@ impl Output {
         }
         Ok(())
     }
+}
+
+/// The permissions that a file's successor has: others' reading, writing and running, but not to run as its owner or group.
+#[cfg(unix)]
+fn mode(replaced: &Metadata) -> u32 {
+    std::os::unix::fs::PermissionsExt::mode(&replaced.permissions()) & 0o777
 }
 
 /// The file at a path before an output replaced it, kept under a second name, if there was one.
@@ -253,5 +299,23 @@ mod tests {
         Output::commit([&old, &new, &bad].map(written).into()).unwrap();
         assert!([&old, &new, &bad].iter().all(|path| fs::read_to_string(path).unwrap() == "after"));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_successor_has_the_owner_and_the_permissions() {
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, chown};
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        fs::write(&path, "before").unwrap();
+        // Only the superuser may give files away.
+        let is_given = chown(&path, Some(1234), Some(2345)).is_ok();
+        fs::set_permissions(&path, PermissionsExt::from_mode(0o6751)).unwrap();
+        let owner = |path: &Path| fs::metadata(path).map(|metadata| (metadata.uid(), metadata.gid())).unwrap();
+        let before = owner(&path);
+        assert_eq!(before == (1234, 2345), is_given);
+        write(&path, b"after").unwrap();
+        assert_eq!((fs::read(&path).unwrap(), owner(&path)), (b"after".to_vec(), before));
+        assert_eq!(fs::metadata(&path).unwrap().mode() & 0o7777, 0o751);
     }
 }

@@ -16,7 +16,7 @@ impl Image {
 
     /// Saves the image by the file's extension: `.png` (straight alpha, `depth` bits), or `.exr` or `.npy` (f32 premultiplied RGBA; NPY has
     /// shape height × width × 4). A regular file is written to a temporary file that is then renamed, with the permissions of the file it
-    /// replaces. Symbolic links are followed; pipes and devices are written directly.
+    /// replaces, without set-uid and set-gid, and its owner and group where the user may give files to these. Symbolic links are followed; pipes and devices are written directly.
     ///
     /// # Errors
     /// If the extension is unknown or the file cannot be written.

@@ -92,14 +92,24 @@ impl ValueSet {
         Self { ranges: merged }
     }
 
+    /// The common values, by one walk over both lists.
     fn intersection(&self, other: &Self) -> Self {
-        let pairs = self.ranges.iter().flat_map(|a| other.ranges.iter().map(move |b| (a, b)));
-        Self::of_ranges(pairs.map(|(a, b)| a.start.max(b.start)..a.end.min(b.end)).collect())
+        let (mut ranges, mut at, mut at_other) = (Vec::new(), 0, 0);
+        while let (Some(a), Some(b)) = (self.ranges.get(at), other.ranges.get(at_other)) {
+            ranges.push(a.start.max(b.start)..a.end.min(b.end));
+            if a.end < b.end { at += 1 } else { at_other += 1 }
+        }
+        Self::of_ranges(ranges)
     }
 
     /// The values in either set.
     pub fn union(&self, other: &Self) -> Self {
         Self::of_ranges([self.ranges.clone(), other.ranges.clone()].concat())
+    }
+
+    /// The values in any of several sets, whose ranges are sorted once.
+    pub fn union_of(sets: impl IntoIterator<Item = Self>) -> Self {
+        Self::of_ranges(sets.into_iter().flat_map(|set| set.ranges).collect())
     }
 
     /// The values in exactly one of the two sets.
@@ -120,17 +130,27 @@ impl ValueSet {
     /// Whether any value from `min` to `max` is in the set.
     pub fn meets(&self, min: f32, max: f32) -> bool {
         let (first, last) = (ordinal(min), ordinal(max));
-        self.ranges.iter().any(|range| range.start <= last && first < range.end)
+        self.ends_behind(first).is_some_and(|range| range.start <= last)
+    }
+
+    /// The first range that ends behind an ordinal.
+    fn ends_behind(&self, ordinal: u32) -> Option<&Range<u32>> {
+        self.ranges.get(self.ranges.partition_point(|range| range.end <= ordinal))
     }
 
     /// Whether a value is in the set.
     pub fn contains(&self, value: f32) -> bool {
         let at = ordinal(value);
-        self.ranges.iter().any(|range| range.contains(&at))
+        self.ends_behind(at).is_some_and(|range| range.start <= at)
     }
 
     /// Sets the flags of those of as many values that are in the set.
     pub fn flag(&self, values: ValueSlice, flags: &mut [bool]) {
+        /// The most ranges for which comparing all values with each is faster than a search for each value.
+        const FEW: usize = 8;
+        if self.ranges.len() > FEW {
+            return values.flag(flags, |value| self.contains(value));
+        }
         for range in &self.ranges {
             let (start, length) = (range.start, range.end - range.start);
             values.flag(flags, |value| ordinal(value).wrapping_sub(start) < length);
@@ -166,6 +186,26 @@ mod tests {
         assert_eq!(values.map(ordinal).map(of_ordinal), values);
         assert_eq!([ordinal(f32::MAX) + 1, ordinal(f32::INFINITY)], [END; 2]);
         assert!(ordinal(f32::NAN) > END);
+    }
+
+    /// By pairs of ranges these would take 80 GB.
+    #[test]
+    fn sets_of_many_ranges_are_walked_through_once() {
+        let ranges = |offset: f64| (0..100_000).map(move |at| [f64::from(at) + offset, f64::from(at) + offset + 0.25]);
+        let set = |offset: f64| ValueSet::of(&transfer(&[(0.0, 1.0)], Some(&ranges(offset).collect::<Vec<_>>())));
+        let [a, b] = [0.0, 0.125].map(set);
+        let (difference, union) = (a.symmetric_difference(&b), ValueSet::union_of([a.clone(), b]));
+        assert_eq!((difference.ranges().len(), union.ranges().len()), (200_000, 100_000));
+        let middle = |share: f32| 50_000.0 + share;
+        assert_eq!([0.0, 0.2, 0.3, 0.5].map(|share| union.contains(middle(share))), [true, true, true, false]);
+        assert_eq!([0.0, 0.2, 0.3, 0.5].map(|share| difference.contains(middle(share))), [true, false, true, false]);
+        assert!(a.meets(middle(0.3), middle(1.0)) && !a.meets(middle(0.3), middle(0.9)));
+        let values: Vec<f32> = (0..1000).map(|at| 70_000.0 + at as f32 / 16.0).collect();
+        let mut flags = vec![false; values.len()];
+        a.flag((&values).into(), &mut flags);
+        assert!(
+            values.iter().zip(flags).all(|(&value, flag)| flag == a.contains(value) && flag == (value.fract() <= 0.25))
+        );
     }
 
     #[test]

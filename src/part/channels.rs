@@ -54,6 +54,24 @@ pub(super) fn from_channels(channels: &[Vec<f32>]) -> Content {
     Content { colors, extremes }
 }
 
+/// The hash of the bits of channels, in hexadecimal digits.
+pub(super) fn hash_of(channels: &[Vec<f32>]) -> String {
+    let mut hash = blake3::Hasher::new();
+    for samples in channels.iter().flat_map(|channel| channel.chunks(1 << 14)) {
+        let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
+        hash.update(&bytes);
+    }
+    hash.finalize().to_hex().to_string()
+}
+
+/// Checks that channels are those that were written, if the file states their hash.
+pub(super) fn check_hash(path: &Path, stated: Option<String>, channels: &[Vec<f32>]) -> Result<(), ImageError> {
+    match stated.filter(|stated| *stated != hash_of(channels)) {
+        Some(stated) => Err(content(path, "part.pixels", "other pixels".to_owned(), format!("those of hash {stated}"))),
+        None => Ok(()),
+    }
+}
+
 /// Reserves the memory of a part's pixels, which its file's bytes must be able to hold.
 pub(super) fn reserve(
     path: &Path,

@@ -6,6 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
+use super::channels::{hash_of, to_channels};
 use super::check::MAX_IMAGES;
 use super::mean::{MeanTables, shows_means};
 use super::{Identity, Part};
@@ -48,6 +49,9 @@ struct Description {
     /// For `average` classified after splatting, of every image.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     means: Vec<Mean>,
+    /// The hash of all channels, by which damage is found; not in files of former versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pixels: Option<String>,
 }
 
 fn one() -> usize {
@@ -154,16 +158,17 @@ pub(super) fn to_json(part: &Part) -> serde_json::Result<String> {
         background: identity.background,
         images: identity.images,
         means: identity.means.iter().map(Mean::from).collect(),
+        pixels: Some(hash_of(&to_channels(part))),
     })
 }
 
-/// What a JSON text says of the part in a file.
-pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), ImageError> {
+/// What a JSON text says of the part in a file, and the hash of its channels if it states that.
+pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window, Option<String>), ImageError> {
     let invalid = |key: &str, found: String, allowed: &str| content(path, key, found, allowed.to_owned());
     let description: Description = serde_json::from_str(text)
         .map_err(|error| invalid("part", error.to_string(), "the description that sheetsplat render writes"))?;
     let Description { version, size, region: [x, y, width, height], slabs, scene_slabs, background, .. } = description;
-    let Description { images, means, opacity_threshold, culling, .. } = description;
+    let Description { images, means, opacity_threshold, culling, pixels, .. } = description;
     if version != VERSION {
         return Err(invalid("part.version", version.to_string(), &VERSION.to_string()));
     }
@@ -215,7 +220,7 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window), I
         culling,
         background,
     };
-    Ok((identity, Window { slabs: slabs[0]..slabs[1], region }))
+    Ok((identity, Window { slabs: slabs[0]..slabs[1], region }, pixels))
 }
 
 fn choice<T: Copy>(path: &Path, key: &str, choices: &[(&'static str, T)], found: &str) -> Result<T, ImageError> {

@@ -12,7 +12,7 @@ use ::exr::prelude::{
 };
 
 use super::Part;
-use super::channels::{Decoded, channel_names, reserve, to_channels};
+use super::channels::{Decoded, channel_names, check_hash, reserve, to_channels};
 use super::description::{from_json, to_json};
 use crate::image::ImageError;
 use crate::image::open::{check_blocks, content};
@@ -57,7 +57,7 @@ pub(super) fn decode(path: &Path, bytes: &[u8], access: &Access) -> Result<Decod
         let found = format!("no attribute {ATTRIBUTE:?} in an image of {} layers", metadata.headers.len());
         return Err(content(path, "part", found, "a part of an image, as sheetsplat render writes it".to_owned()));
     };
-    let (identity, window) = from_json(path, &json)?;
+    let (identity, window, pixels) = from_json(path, &json)?;
     let size = header.layer_size;
     let region = window.region;
     if (size.width(), size.height()) != (region.width as usize, region.height as usize) {
@@ -81,6 +81,7 @@ pub(super) fn decode(path: &Path, bytes: &[u8], access: &Access) -> Result<Decod
             _ => Err(content(path, name, "other samples".to_owned(), "a 32-bit float for every pixel".to_owned())),
         }
     };
-    let channels = names.iter().map(channel).collect::<Result<_, _>>()?;
+    let channels: Vec<_> = names.iter().map(channel).collect::<Result<_, _>>()?;
+    check_hash(path, pixels, &channels)?;
     Ok((identity, window, channels))
 }

@@ -14,7 +14,7 @@ const DOMAIN: &str = "sheetsplat part 1\n";
 ///
 /// # Errors
 /// If the scene cannot be written as TOML.
-pub(super) fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, SceneError> {
+pub fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, SceneError> {
     let explicit = scene.explicit(volume.sample());
     let mut hash = blake3::Hasher::new();
     hash.update(DOMAIN.as_bytes()).update(settings(explicit)?.as_bytes());

@@ -11,7 +11,7 @@ use super::mean::{MeanTables, note_labels};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::scene::{OpenVolume, Scene};
+use crate::scene::{OpenVolume, Scene, SceneError};
 use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::Window;
 
@@ -76,6 +76,14 @@ impl Part {
         Ok(Self::named(identity, window.clone(), vec![content]))
     }
 
+    /// Whether this is the part of a scene's image in a window, whatever drew it.
+    ///
+    /// # Errors
+    /// If the scene cannot be written as TOML.
+    pub fn shows(&self, volume: &OpenVolume, scene: &Scene, window: &Window) -> Result<bool, SceneError> {
+        Ok(self.window == *window && self.identity.fingerprint == fingerprint::fingerprint(volume, scene)?)
+    }
+
     /// A part with its slabs and pixels as its name.
     pub(crate) fn named(identity: Identity, window: Window, contents: Vec<Content>) -> Self {
         let Window { slabs: Range { start, end }, region } = &window;
@@ -94,7 +102,7 @@ impl Part {
 impl Identity {
     /// What the parts of a scene of a volume have in common.
     pub(crate) fn of((volume, scene): (&OpenVolume, &Scene), view: &ViewGeometry) -> Result<Self, RenderError> {
-        let refused = |error: crate::scene::SceneError| SettingError::new("scene", error.to_string(), "another scene");
+        let refused = |error: SceneError| SettingError::new("scene", error.to_string(), "another scene");
         Ok(Self {
             fingerprint: fingerprint::fingerprint(volume, scene).map_err(refused)?,
             size: view.size,

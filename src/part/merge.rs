@@ -109,7 +109,7 @@ impl Image {
             regions.entry(part.window.region).or_default().push(part);
         }
         let (_, identity) = first.ok_or(MergeError::Empty)?;
-        check_regions(&regions, identity.size)?;
+        check_regions(&regions, &identity)?;
         let [width, height] = identity.size;
         let mut image = Self { width, height, pixels: vec![[0.0; 4]; width as usize * height as usize] };
         for (region, parts) in regions {
@@ -194,14 +194,20 @@ fn check_content(part: &Part) -> Result<(), MergeError> {
     Ok(())
 }
 
-/// Checks that regions fill an image without overlapping.
-fn check_regions(regions: &BTreeMap<Region, Vec<Part>>, [width, height]: [u32; 2]) -> Result<(), MergeError> {
+/// Checks that regions fill an image, and that those of parts that show something share no pixels.
+fn check_regions(regions: &BTreeMap<Region, Vec<Part>>, identity: &Identity) -> Result<(), MergeError> {
+    let [width, height] = identity.size;
     let all: Vec<&Region> = regions.keys().collect();
-    let name = |region: &Region| regions.get(region).and_then(|parts| parts.first()).map_or("", |part| &part.name);
-    for (at, region) in all.iter().enumerate() {
-        if let Some(other) = all[..at].iter().find(|other| other.overlaps(region)) {
-            let what = format!("pixels of region {other}");
-            return Err(MergeError::Overlap { part: name(region).to_owned(), what, other: name(other).to_owned() });
+    let shown: Vec<(&Region, Vec<(&Part, Range<i32>)>)> = (regions.iter())
+        .map(|(region, parts)| {
+            let within = parts.iter().map(|part| (part, part.window.within(&identity.slabs)));
+            (region, within.filter(|(_, slabs)| !slabs.is_empty()).collect())
+        })
+        .filter(|(_, parts): &(_, Vec<_>)| !parts.is_empty())
+        .collect();
+    for (at, (region, parts)) in shown.iter().enumerate() {
+        if let Some((other, others)) = shown[..at].iter().find(|(other, _)| other.overlaps(region)) {
+            return Err(sharing((region, parts), (other, others)));
         }
     }
     // Between neighbouring edges all pixels are alike.
@@ -222,6 +228,30 @@ fn check_regions(regions: &BTreeMap<Region, Vec<Part>>, [width, height]: [u32; 2
         }
     }
     Ok(())
+}
+
+/// A region, and the parts that show some slabs of it.
+type Shown<'a> = (&'a Region, &'a [(&'a Part, Range<i32>)]);
+
+/// The error for two regions that share pixels: parts overlap that show the same slabs; others cannot be joined, as their pixels differ.
+fn sharing((region, parts): Shown<'_>, (other, others): Shown<'_>) -> MergeError {
+    let name = |(part, _): &(&Part, Range<i32>)| part.name.clone();
+    let pairs = parts.iter().flat_map(|part| others.iter().map(move |other| (part, other)));
+    let both = |(_, a): &(&Part, Range<i32>), (_, b): &(&Part, Range<i32>)| a.start.max(b.start)..a.end.min(b.end);
+    match pairs.map(|(a, b)| (a, b, both(a, b))).find(|(.., slabs)| !slabs.is_empty()) {
+        Some((part, other_part, Range { start, end })) => {
+            let common = region.common(other);
+            let what = format!("slabs {start}..{end} of region {common}");
+            MergeError::Overlap { part: name(part), what, other: name(other_part) }
+        }
+        None => MergeError::Different {
+            part: parts.first().map(name).unwrap_or_default(),
+            field: "region",
+            found: region.to_string(),
+            other: others.first().map(name).unwrap_or_default(),
+            expected: format!("{other}, or a region that shares no pixels with it"),
+        },
+    }
 }
 
 /// The content of a region for every image that is added up, whose parts must show each of the scene's slabs once.

@@ -32,7 +32,7 @@ mod description;
 mod exr;
 #[cfg(feature = "codecs")]
 mod file;
-mod fingerprint;
+pub(crate) mod fingerprint;
 mod identity;
 mod mean;
 mod merge;

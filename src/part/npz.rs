@@ -6,7 +6,7 @@ use std::path::Path;
 use flate2::Crc;
 
 use super::Part;
-use super::channels::{Decoded, channel_names, to_channels};
+use super::channels::{Decoded, channel_names, check_hash, to_channels};
 use super::description::{from_json, to_json};
 use crate::image::ImageError;
 use crate::image::open::{content, of_volume};
@@ -66,7 +66,7 @@ fn archive(files: &[(&str, &[u8])]) -> Option<Vec<u8>> {
 pub(super) fn decode(path: &Path, access: &Access) -> Result<Decoded, ImageError> {
     let read = npz::text_and_array(path, (DESCRIPTION, MAX_DESCRIPTION), PIXELS, access);
     let (json, array) = read.map_err(of_volume)?;
-    let (identity, window) = from_json(path, &json)?;
+    let (identity, window, pixels) = from_json(path, &json)?;
     let (region, names) = (window.region, channel_names(&identity));
     let [channels, width, height] = array.dims.to_array();
     if [channels, width, height] != [names.len() as u32, region.width, region.height] {
@@ -77,5 +77,7 @@ pub(super) fn decode(path: &Path, access: &Access) -> Result<Decoded, ImageError
         return Err(content(path, "descr", array.kind.to_string(), "float32".to_owned()));
     }
     let channel = |channel: usize| array.values.as_slice().iter().skip(channel).step_by(names.len()).collect();
-    Ok((identity, window, (0..names.len()).map(channel).collect()))
+    let channels: Vec<_> = (0..names.len()).map(channel).collect();
+    check_hash(path, pixels, &channels)?;
+    Ok((identity, window, channels))
 }

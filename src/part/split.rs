@@ -16,7 +16,7 @@ const CELLS: u32 = 64;
 const BINS: usize = 1024;
 
 /// Divides the image of a scene into parts of about equal work: pixels of kernel sections, without what opaque pixels hide. Each region's slab
-/// ranges follow one another.
+/// ranges follow one another. Of a view that shows no slab there is one part for each region, fewer than are asked for.
 ///
 /// # Errors
 /// If the scene has no parts, or fewer slabs and pixels than parts are asked for.
@@ -32,6 +32,11 @@ pub fn split(volume: &OpenVolume, scene: &Scene, parts: usize) -> Result<Vec<Win
     let mut windows = Vec::new();
     for (area, count) in cut {
         let region = work.region(&area);
+        if work.slabs.is_empty() {
+            // A view that misses the volume has no slabs to divide: a part of none is as good as several.
+            windows.push(Window { slabs: work.slabs.clone(), region });
+            continue;
+        }
         if count > work.slabs.len() {
             let allowed = format!("at most {} for {} slabs", regions * work.slabs.len(), work.slabs.len());
             return Err(SettingError::new("parts", parts.to_string(), allowed).into());

@@ -3,7 +3,7 @@
 use super::{ImageSettings, Scene, TransferSettings};
 use crate::appearance::Colormap;
 use crate::error::setting::{Interval, SettingError};
-use crate::settings::transfer_function::{check_iso_ranges, check_labels, check_ramps};
+use crate::settings::transfer_function::{Parts, check_iso_ranges, check_labels, check_pieces, check_ramps};
 use crate::volume::{Volume, check_spacing};
 
 impl ImageSettings {
@@ -28,8 +28,7 @@ impl TransferSettings {
     /// Checks that the values are in range.
     ///
     /// # Errors
-    /// If a colour, opacity or factor is not in [0, 1] (in labels' tables, too), the list of iso-ranges is empty, or an iso-range is
-    /// reversed or not finite.
+    /// As for [`TransferFunction::check`](crate::settings::TransferFunction::check).
     pub fn check(&self) -> Result<(), SettingError> {
         self.check_as("transfer")
     }
@@ -39,6 +38,11 @@ impl TransferSettings {
         check_ramps(table, self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())?;
         check_iso_ranges(table, self.iso_ranges.as_deref())?;
         check_labels(table, &self.labels)
+    }
+
+    fn parts(&self) -> Parts<'_> {
+        let (color, opacity) = (self.color.as_ref(), self.opacity.as_ref());
+        Parts { color, opacity, iso_ranges: self.iso_ranges.as_deref(), labels: &self.labels }
     }
 
     /// Checks that the volume has the labels or palette that the settings need.
@@ -86,8 +90,18 @@ impl Scene {
         for (number, channel) in self.channels().enumerate() {
             channel.transfer.check_as(&self.transfer_table(number))?;
         }
+        self.check_pieces()?;
         self.shading.check()?;
         self.splatting.check()
+    }
+
+    /// Checks that the tables of all channels together are not too long.
+    pub(super) fn check_pieces(&self) -> Result<(), SettingError> {
+        let further = self.further.iter().map(|channel| &channel.transfer);
+        check_pieces(
+            &self.transfer_table(0),
+            std::iter::once(&self.transfer).chain(further).map(TransferSettings::parts),
+        )
     }
 
     /// Checks that a volume has the channels that the scene has tables for, and the labels or palettes that these need.

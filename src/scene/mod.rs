@@ -10,7 +10,7 @@ mod image_settings;
 mod level;
 mod load;
 pub(crate) mod names;
-mod open;
+pub(crate) mod open;
 mod overrides;
 mod reader;
 mod source;
@@ -48,18 +48,23 @@ impl Scene {
     /// to the scene file's folder.
     ///
     /// # Errors
-    /// If the file cannot be read or is not TOML, if a key is unknown, or if a value is not allowed.
+    /// If the file cannot be read, has more than 16 MiB or is not TOML, if a key is unknown, if a value is not allowed, or if the file takes more memory
+    /// than [`ReadOptions::memory`] allows by default.
     pub fn open(path: &Path, sets: &[String]) -> Result<Self, SceneError> {
         Self::open_with(path, sets, &ReadOptions::default())
     }
 
-    /// Like [`Self::open`], with a folder that the scene file must lie in. [`Self::load_volume_with`] reads the files that the scene names.
+    /// Like [`Self::open`], with a folder that the scene file must lie in and a memory limit. [`Self::load_volume_with`] reads the files that the scene names.
     ///
     /// # Errors
     /// As for [`Self::open`], and if the scene file lies outside the folder.
     pub fn open_with(path: &Path, sets: &[String], options: &ReadOptions) -> Result<Self, SceneError> {
         let access = Access::new(options)?;
-        let text = access.text(path)?.map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
+        let text = access.text(path, MAX_TEXT)?.map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
+        let length = text.len() as u64;
+        if length > SMALL_TEXT {
+            access.reserve(path, "size", format_args!("{length} bytes of a scene"), length * PER_BYTE)?;
+        }
         Self::parse(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")), sets)
     }
 
@@ -67,7 +72,7 @@ impl Scene {
     /// `volume.labels` is relative to `folder`.
     ///
     /// # Errors
-    /// If the text is not TOML, if a key is unknown, or if a value is not allowed.
+    /// If the text has more than 16 MiB or is not TOML, if a key is unknown, or if a value is not allowed.
     pub fn parse(text: &str, origin: &str, folder: &Path, sets: &[String]) -> Result<Self, SceneError> {
         Self::build(parse_table(text, origin)?, origin, folder, None, sets)
     }
@@ -287,11 +292,33 @@ impl Scene {
             let (key, found) = ("splatting.classification", "\"after\" with preset = \"labels\"");
             return Err(origins.invalid(key, &["preset"], found, "\"before\" with it"));
         }
+        // Tables too long to be quoted are counted.
+        scene
+            .check_pieces()
+            .map_err(|error| origins.invalid(&error.key, &[], error.found.to_string(), error.allowed))?;
         Ok(scene)
     }
 }
 
+/// The maximum length of a scene's text in bytes: tables of 65 536 labels, each of which states its colour and opacity, fit.
+const MAX_TEXT: u64 = 16 << 20;
+
+/// The bytes of memory that reading a scene takes for each byte of its text: at most 112 were measured, of short numbers in arrays.
+const PER_BYTE: u64 = 128;
+
+/// The length of a text whose memory is not counted.
+const SMALL_TEXT: u64 = 16 << 10;
+
+fn check_length(length: u64, origin: &str) -> Result<(), SceneError> {
+    if length <= MAX_TEXT {
+        return Ok(());
+    }
+    let (origin, key, found) = (origin.to_owned(), "size".to_owned(), format!("more than {MAX_TEXT} bytes"));
+    Err(SceneError::Invalid { origin, key, found, allowed: format!("at most {MAX_TEXT} bytes of a scene").into() })
+}
+
 fn parse_table(text: &str, origin: &str) -> Result<Table, SceneError> {
+    check_length(text.len() as u64, origin)?;
     text.parse().map_err(|error: toml::de::Error| SceneError::Syntax {
         origin: origin.to_owned(),
         message: error.to_string().trim_end().to_owned(),

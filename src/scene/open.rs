@@ -7,11 +7,13 @@ use glam::UVec3;
 use super::names::{METHODS, name_of};
 use super::{Scene, load};
 use crate::error::setting::SettingError;
-use crate::parallel;
 use crate::settings::splatting::{Classification, Interpolation, Method, Splatting};
 use crate::volume::{
     Access, COLOR_BYTES, Grid, ReadOptions, StoreIndex, StreamedLevel, StreamedVolume, Volume, VolumeError,
 };
+
+/// The chunks that a thread that draws has in memory: its own, two that are read ahead, and one whose voxels are sorted.
+pub(crate) const CHUNKS_OF_THREAD: u64 = 4;
 
 /// A volume that can be drawn.
 #[derive(Clone, Debug)]
@@ -158,13 +160,14 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
             largest = largest.max(of_voxels(of.chunk, read));
         }
     }
-    // Every thread that draws or reads holds some chunks, beside those that wait for other tiles.
-    let least = largest.saturating_mul(4 * parallel::current_num_threads() as u64);
+    // A thread that draws holds some chunks, beside those that are read for it. More threads draw where there is room for theirs.
+    let least = largest.saturating_mul(CHUNKS_OF_THREAD);
     if bytes <= memory || least > memory / 2 {
         return Ok(None);
     }
     if let Some(path) = &options.index {
-        let text = access.text(path)?.map_err(|source| VolumeError::io(path, source))?;
+        // The text, and up to five times as many bytes of ranges.
+        let text = access.text(path, memory / 8)?.map_err(|source| VolumeError::io(path, source))?;
         let origin = path.display().to_string();
         StreamedVolume::index((&mut first, &mut further), StoreIndex::decode(&origin, &text)?, &origin)?;
     }

@@ -184,17 +184,80 @@ impl Tables<'_> {
     }
 }
 
-/// Checks that the values of a table's ramps are in [0, 1]; `Ramp` itself checks their positions.
+/// The most control points of a ramp of opacities or factors, and the most iso-ranges: pixels of surfaces look at all of them.
+const MAX_POINTS: usize = 1 << 12;
+
+/// The most control points of a ramp of colours: those of a palette of 16 bits.
+const MAX_COLORS: usize = 1 << 16;
+
+/// The most pieces of all tables, those of labels included, over which opacities and colours are linear: of each piece backends keep up to 700 bytes.
+const MAX_PIECES: usize = 1 << 19;
+
+/// Checks the number of entries of a list.
+fn check_length(key: &str, count: usize, most: usize) -> Result<(), SettingError> {
+    if count > most {
+        return Err(SettingError::new(key, format!("{count} entries"), format!("at most {most} entries, not {count}")));
+    }
+    Ok(())
+}
+
+/// The parts of a channel's tables that determine their pieces; `None` stands for a short ramp that is chosen from the volume.
+pub(crate) struct Parts<'a> {
+    pub(crate) color: Option<&'a Ramp<DVec3>>,
+    pub(crate) opacity: Option<&'a Ramp<f64>>,
+    pub(crate) iso_ranges: Option<&'a [[f64; 2]]>,
+    pub(crate) labels: &'a BTreeMap<u16, LabelTables>,
+}
+
+/// Checks that the tables of all channels have a bounded number of pieces: those of a channel count again for each label that uses them.
+pub(crate) fn check_pieces<'a>(table: &str, channels: impl Iterator<Item = Parts<'a>>) -> Result<(), SettingError> {
+    let of_opacity = |ramp: Option<&Ramp<f64>>| ramp.map_or(1, opacity_pieces);
+    let of_color = |ramp: Option<&Ramp<DVec3>>| ramp.map_or(1, |ramp| ramp.points().len());
+    let of_channel = |Parts { color, opacity, iso_ranges, labels }: Parts| {
+        let (opacities, colors) = (of_opacity(opacity), of_color(color));
+        let ends = 2 * iso_ranges.map_or(0, <[_]>::len);
+        let of_label = |own: &LabelTables| {
+            let opacities = own.opacity.as_ref().map_or(opacities, opacity_pieces);
+            opacities + own.color.as_ref().map_or(colors, |ramp| ramp.points().len()) + ends
+        };
+        let all = labels.values().map(of_label).chain([opacities + colors + ends]);
+        all.fold(0_usize, usize::saturating_add)
+    };
+    let pieces = channels.map(of_channel).fold(0_usize, usize::saturating_add);
+    if pieces > MAX_PIECES {
+        let found = format!("tables of {pieces} pieces, those of labels included");
+        return Err(SettingError::new(
+            table,
+            found,
+            format!("at most {MAX_PIECES}: fewer control points, iso-ranges or labels"),
+        ));
+    }
+    Ok(())
+}
+
+/// The most pieces that a ramp of opacities is cut into: `exponential` cuts each of its own wherever 1 - α has fallen to 0.84 (SPEC §9).
+fn opacity_pieces(ramp: &Ramp<f64>) -> usize {
+    let transparency = |alpha: f64| (1.0 - alpha).max(1e-4);
+    let cuts = |pair: &[(f64, f64)]| {
+        let ratio = transparency(pair[0].1) / transparency(pair[1].1);
+        (libm::log(ratio).abs() / 0.173) as usize
+    };
+    ramp.points().len() + ramp.points().windows(2).map(cuts).sum::<usize>()
+}
+
+/// Checks that the values of a table's ramps are in [0, 1], and that these are not too long; `Ramp` itself checks their positions.
 pub(crate) fn check_ramps(
     table: &str,
     color: Option<&Ramp<DVec3>>,
     opacity: Option<&Ramp<f64>>,
     gradient_opacity: Option<&Ramp<f64>>,
 ) -> Result<(), SettingError> {
+    check_length(&format!("{table}.color"), color.map_or(0, |ramp| ramp.points().len()), MAX_COLORS)?;
     for (at, (_, rgb)) in color.iter().flat_map(|ramp| ramp.points()).enumerate() {
         Interval::SHARE.check_each(&format!("{table}.color[{at}][1]"), &rgb.to_array())?;
     }
     for (name, ramp) in [("opacity", opacity), ("gradient_opacity", gradient_opacity)] {
+        check_length(&format!("{table}.{name}"), ramp.map_or(0, |ramp| ramp.points().len()), MAX_POINTS)?;
         for (at, &(_, share)) in ramp.iter().flat_map(|ramp| ramp.points()).enumerate() {
             Interval::SHARE.check(&format!("{table}.{name}[{at}][1]"), share)?;
         }
@@ -214,6 +277,7 @@ pub(crate) fn check_iso_ranges(table: &str, iso_ranges: Option<&[[f64; 2]]>) -> 
     if ranges.is_empty() {
         return Err(SettingError::new(list, "[]", "an array of one or more [lo, hi]"));
     }
+    check_length(&list, ranges.len(), MAX_POINTS)?;
     for (at, range) in ranges.iter().enumerate() {
         let key = format!("{list}[{at}]");
         Interval::FINITE.check_each(&key, range)?;
@@ -228,10 +292,12 @@ impl TransferFunction {
     /// Checks that the values are in range.
     ///
     /// # Errors
-    /// If a colour, opacity or factor is not in [0, 1] (in labels' tables, too), the list of iso-ranges is empty, or an iso-range is
-    /// reversed or not finite.
+    /// If a colour, opacity or factor is not in [0, 1] (in labels' tables, too), the list of iso-ranges is empty, an iso-range is
+    /// reversed or not finite, or there are more control points, iso-ranges or labels' tables than are drawn (65 536 points of colours, 4096 of others,
+    /// 4096 iso-ranges, 524 288 pieces of all tables).
     pub fn check(&self) -> Result<(), SettingError> {
         self.check_as("transfer")?;
+        check_pieces("transfer", self.channels().map(Self::parts))?;
         (1..).zip(&self.further).try_for_each(|(number, of)| of.check_as(&format!("channel[{number}].transfer")))
     }
 
@@ -240,6 +306,11 @@ impl TransferFunction {
         check_ramps(table, Some(&self.color), Some(&self.opacity), self.gradient_opacity.as_ref())?;
         check_iso_ranges(table, self.iso_ranges.as_deref())?;
         check_labels(table, &self.labels)
+    }
+
+    fn parts(&self) -> Parts<'_> {
+        let Self { color, opacity, iso_ranges, labels, .. } = self;
+        Parts { color: Some(color), opacity: Some(opacity), iso_ranges: iso_ranges.as_deref(), labels }
     }
 
     /// A transfer function with only colour and opacity.

@@ -46,6 +46,14 @@ impl Region {
         meet(self.columns(), other.columns()) && meet(self.rows(), other.rows())
     }
 
+    /// The pixels of both of two regions that overlap.
+    pub(crate) fn common(&self, other: &Self) -> Self {
+        let (x, y) = (self.x.max(other.x), self.y.max(other.y));
+        let right = (self.x + self.width).min(other.x + other.width);
+        let bottom = (self.y + self.height).min(other.y + other.height);
+        Self { x, y, width: right.saturating_sub(x), height: bottom.saturating_sub(y) }
+    }
+
     /// Checks that the region lies within an image.
     ///
     /// # Errors

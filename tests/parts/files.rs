@@ -5,7 +5,7 @@ use std::path::Path;
 use sheetsplat::headless::Backend;
 use sheetsplat::image::ImageError;
 use sheetsplat::part::{Extreme, MergeError};
-use sheetsplat::settings::{Classification, Compositing, Order};
+use sheetsplat::settings::{Classification, Compositing, Order, Region};
 use sheetsplat::volume::ReadOptions;
 use sheetsplat::{Image, Part};
 
@@ -109,7 +109,16 @@ fn gaps_and_overlaps_are_named() {
     let mut wide = parts.clone();
     wide[0].window.region.width += 1;
     wide[0].content.colors.extend(vec![[0.0; 4]; region.height as usize]);
-    assert!(refused(wide).contains("also shows"));
+    // It shares pixels with other slabs of its own region: nothing is shown twice, but the parts cannot be joined.
+    let message = refused(wide.clone());
+    assert!(
+        message.contains(": region: found ") && message.contains("or a region that shares no pixels with it"),
+        "{message}"
+    );
+    let shared = Region { x: region.x + region.width, y: region.y, width: 1, height: region.height };
+    wide.retain(|part| part.window.region.x > region.x || part.window.region.width > region.width);
+    let message = refused(wide);
+    assert!(message.contains("also shows") && message.contains(&format!(" of region {shared}, ")), "{message}");
 }
 
 #[test]

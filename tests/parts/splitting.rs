@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use sheetsplat::headless::Backend;
-use sheetsplat::settings::Window;
+use sheetsplat::settings::{Projection, Window};
 use sheetsplat::{Image, part};
 
 use crate::common::compare::assert_at_most;
@@ -34,6 +34,21 @@ fn windows_cover_all_once() {
     }
     let error = part::split(&Arc::clone(&volume).into(), &scene, 60_000).unwrap_err().to_string();
     assert!(error.starts_with("parts: found 60000, allowed: at most "), "{error}");
+}
+
+/// A view that shows no slab is one of parts, too.
+#[test]
+fn an_empty_view_has_parts() {
+    let (volume, mut scene) = head(32, [70, 41]);
+    scene.camera.projection = Projection::Perspective { fov_y: 30.0, distance: Some(100.0), near: Some(1000.0) };
+    let headless = headless(Backend::Cpu);
+    let windows = part::split(&Arc::clone(&volume).into(), &scene, 9).unwrap();
+    assert_eq!(windows.len(), 3);
+    assert!(windows.iter().all(|window| window.slabs.is_empty()));
+    let mut view = headless.view(Arc::clone(&volume), &scene).unwrap();
+    let parts: Vec<_> = windows.iter().map(|window| headless.draw_part(&mut view, window).unwrap().0).collect();
+    let whole = headless.render_volume(volume, &scene).unwrap().image;
+    assert_eq!(Image::merge(parts).unwrap().pixels, whole.pixels);
 }
 
 /// The work of windows, measured in the sections that they draw, is about equal; equal shares of slabs and pixels are not.

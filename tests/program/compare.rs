@@ -207,7 +207,7 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
         folder.run(&format!("compare {arguments}")).assert_failure(2, words);
         assert_eq!(folder.names(), before, "{arguments}");
     }
-    folder.run("compare a.png b.png --difference no/d.png").assert_failure(1, &["no/d.png", "No such file"]);
+    folder.run("compare a.png b.png --difference no/d.png").assert_failure(2, &["no/d.png", "No such file"]);
     folder.run("compare a.png b.png --difference folder.png").assert_failure(1, &["folder.png", "directory"]);
 }
 

@@ -125,13 +125,17 @@ fn an_image_beyond_the_texture_limit_is_2() {
 fn other_failures_are_1() {
     assert_fails(1, "render good.nrrd -o out.png --adapter Voodoo", &["Voodoo", "required", "actual"]);
     let small = "render good.nrrd --set image={width=8,height=8}";
-    assert_fails(1, &format!("{small} -o no/such/folder/out.png"), &["no/such/folder/out.png", "No such file"]);
+    assert_fails(2, &format!("{small} -o no/such/folder/out.png"), &["the folder no/such/folder: No such file"]);
     assert_fails(1, &format!("{small} -o folder.png"), &["folder.png", "directory"]);
-    assert_fails(1, &format!("{small} -o good.nrrd/out.png"), &["good.nrrd/out.png"]);
+    assert_fails(2, &format!("{small} -o good.nrrd/out.png"), &["good.nrrd/out.png"]);
     // Either both files are written or neither.
-    assert_fails(1, &format!("{small} -o new.png --stats no/stats.json"), &["no/stats.json", "No such file"]);
+    assert_fails(
+        2,
+        &format!("{small} -o new.png --stats no/stats.json"),
+        &["no/stats.json", "the folder no: No such file"],
+    );
     assert_fails(1, &format!("{small} -o new.png --stats folder.png"), &["folder.png", "directory"]);
-    assert_fails(1, &format!("{small} -o no/new.png --stats stats.json"), &["no/new.png", "No such file"]);
+    assert_fails(2, &format!("{small} -o no/new.png --stats stats.json"), &["no/new.png", "No such file"]);
 }
 
 #[test]
@@ -229,4 +233,61 @@ fn terminals_obey_no_file() {
             }
         }
     }
+}
+
+/// A folder that takes no files is found before anything is read or drawn.
+#[cfg(target_os = "linux")]
+#[test]
+fn folders_that_take_no_files_are_2() {
+    let folder = Folder::new();
+    for arguments in
+        ["render gone.nrrd -o /proc/e.png", "render builtin:cube:8 -o a.png --stats /proc/s.json --adapter nonesuch"]
+    {
+        folder.run(arguments).assert_failure(2, &["/proc/", "the folder /proc: "]);
+    }
+    folder.run("orbit builtin:cube:8 -o /proc/%d.png --adapter nonesuch").assert_failure(2, &["the folder /proc: "]);
+    assert!(folder.names().is_empty());
+}
+
+/// What a small scene file may cost is limited.
+#[test]
+fn scenes_are_limited() {
+    let folder = Folder::new();
+    let scene = |rest: &str| format!("[volume]\nbuiltin = \"head:16\"\n[image]\nwidth = 8\nheight = 8\n{rest}\n");
+    let refused = |name: &str, options: &str, words: &[&str]| {
+        let run = folder.run(format!("render {name} -o a.png --backend cpu {options}").trim());
+        run.assert_failure(2, &[&[name][..], words].concat());
+        assert!(run.stderr.len() < 2000);
+    };
+    let list = |count: usize, item: &dyn Fn(usize) -> String| (0..count).map(item).collect::<Vec<_>>().join(",");
+    let range = |at: usize| format!("[{at},{at}.5]");
+    let point = |at: usize| format!("[{at},{}]", at % 2);
+    let color = |at: usize| format!("[{at},[0,0,0]]");
+    for (count, key, text) in [
+        (4097, "iso_ranges", list(4097, &range)),
+        (4097, "opacity", list(4097, &point)),
+        (4097, "gradient_opacity", list(4097, &point)),
+        (65_537, "color", list(65_537, &color)),
+    ] {
+        folder.write("long.toml", scene(&format!("[transfer]\n{key} = [{text}]")));
+        let allowed = format!("allowed: at most {} entries, not {count}", count - 1);
+        refused("long.toml", "", &[&format!("transfer.{key}: found ["), &allowed]);
+    }
+    // A ramp that all labels share counts for each of them.
+    let labels: String = (0..600).map(|label| format!("[[transfer.label]]\nlabel = {label}\n")).collect();
+    folder.write(
+        "labels.toml",
+        scene(&format!("[transfer]\nopacity = [{}]\n{labels}", list(4000, &|at| format!("[{at},0.5]")))),
+    );
+    refused(
+        "labels.toml",
+        "",
+        &["transfer: found tables of ", " pieces, those of labels included, allowed: at most 524288"],
+    );
+    // Text takes memory, too.
+    folder.write("text.toml", scene(&format!("# {}", "x".repeat(100_000))));
+    refused("text.toml", "--memory 10MiB", &["size: found ", " bytes of a scene, which take "]);
+    folder.run("render text.toml -o a.png --backend cpu --memory 100MiB").assert_success();
+    folder.write("huge.toml", scene(&format!("# {}", "x".repeat(16 << 20))));
+    refused("huge.toml", "", &["size: found more than 16777216 bytes, allowed: at most 16777216 bytes"]);
 }

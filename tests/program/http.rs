@@ -37,6 +37,27 @@ fn a_store_at_an_address_is_drawn_like_one_on_disk() {
     folder.render("saved.toml --backend cpu -o saved.npy");
     assert!(folder.read("saved.npy") == folder.read("scene.npy"), "the images differ");
 
+    // No message tells a password.
+    let with = |rest: &str| {
+        format!("{}/{rest}", address.replace("http://", "http://me:secret@").trim_end_matches("/files/ball.zarr"))
+    };
+    for rest in
+        ["broken/ball.zarr", "files/none.zarr", "short/ball.zarr", "loop/ball.zarr", "files/ball.zarr --slabs 0..1"]
+    {
+        for verbosity in ["-v", "-q"] {
+            let run = folder.run(&format!("render {} --backend cpu -o no.png {verbosity}", with(rest)));
+            assert!(!run.stderr.contains("secret"), "{}", run.stderr);
+            assert!(run.code == Some(2) && (run.stderr.contains("://…@") || rest.contains("slabs")), "{}", run.stderr);
+        }
+    }
+    let run = folder.run(&format!("info {} -v", with("files/ball.zarr")));
+    assert!(
+        run.code == Some(0) && !run.stderr.contains("secret") && !run.stdout.contains("secret"),
+        "{}{}",
+        run.stdout,
+        run.stderr
+    );
+
     server.take_requests();
     folder
         .run("render scene.toml --confine . -o no.png")

@@ -153,7 +153,7 @@ fn bad_names_and_files_are_2_and_leave_nothing() {
         assert_eq!(folder.names(), before, "{arguments}");
     }
     let run = folder.run(&format!("render {HEAD} -o a.png --save-scene no/s.toml"));
-    run.assert_failure(1, &["no/s.toml", "No such file"]);
-    folder.run(&format!("render {HEAD} -o no/a.png --save-scene s.toml")).assert_failure(1, &["no/a.png"]);
+    run.assert_failure(2, &["no/s.toml", "No such file"]);
+    folder.run(&format!("render {HEAD} -o no/a.png --save-scene s.toml")).assert_failure(2, &["no/a.png"]);
     assert_eq!(folder.names(), before);
 }

@@ -52,7 +52,7 @@ fn the_camera_turns_by_the_right_hand_and_ends_a_step_early() {
     let folder = Folder::new();
     let from = |direction: &str| folder.pixels(&format!("{SMALL} {WHOLE} --set camera.direction={direction}"));
     folder.orbit(&format!("{SMALL} {WHOLE} --set camera.direction=[0,1,0] --count 4 -o %d.npy"));
-    assert_eq!(folder.names(), set(&["0.npy", "1.npy", "2.npy", "3.npy"]));
+    assert_eq!(folder.names(), set(&["#.npy.made", "0.npy", "1.npy", "2.npy", "3.npy"]));
     for (frame, direction) in ["[0,1,0]", "[-1,0,0]", "[0,-1,0]", "[1,0,0]"].into_iter().enumerate() {
         let (.., turned) = folder.read_npy(&format!("{frame}.npy"));
         let decibels = psnr(&turned, &from(direction).2, BLACK, 50);
@@ -68,16 +68,41 @@ fn the_camera_turns_by_the_right_hand_and_ends_a_step_early() {
 #[test]
 fn existing_images_are_not_drawn_again() {
     let folder = Folder::new();
+    let drawn = |arguments: &str| {
+        let run = folder.run(format!("orbit {TURNING} --count 3 -o f%d.png {arguments}").trim());
+        run.assert_success();
+        run.stderr.lines().filter(|line| line.contains("kept")).map(str::to_owned).collect::<String>()
+    };
     folder.write("f1.png", "not an image");
-    folder.orbit(&format!("{TURNING} --count 3 -o f%d.png"));
-    assert_eq!(folder.names(), set(&["f0.png", "f1.png", "f2.png"]), "nothing else stays");
-    assert_eq!(folder.read("f1.png"), b"not an image");
-    let last = folder.read("f2.png");
+    assert_eq!(drawn(""), "");
+    assert_eq!(folder.names(), set(&["f#.png.made", "f0.png", "f1.png", "f2.png"]), "nothing else stays");
+    let frames = || ["f0.png", "f1.png", "f2.png"].map(|name| folder.read(name));
+    let first = frames();
     fs::remove_file(folder.path("f2.png")).unwrap();
-    folder.orbit(&format!("{TURNING} --count 3 -o f%d.png"));
-    assert_eq!(folder.read("f2.png"), last);
+    assert_eq!(drawn(""), "2 of 3 frames are kept, drawn before");
+    assert_eq!(frames(), first);
     // If every frame exists already, no device is needed.
-    folder.orbit(&format!("{TURNING} --count 3 -o f%d.png --adapter nonesuch"));
+    assert_eq!(drawn("--adapter nonesuch"), "3 of 3 frames are kept, drawn before");
+    // Names are not believed: empty, damaged and exchanged frames are drawn again, and those of another scene.
+    folder.write("f0.png", "");
+    folder.write("f1.png", &first[1][..first[1].len() - 1]);
+    assert_eq!(drawn(""), "1 of 3 frames are kept, drawn before");
+    assert_eq!(frames(), first);
+    folder.write("f0.png", &first[1]);
+    assert_eq!(drawn(""), "2 of 3 frames are kept, drawn before");
+    assert_eq!(frames(), first);
+    for other in ["--set splatting.radius=1.5", "--turn 90", "--set volume.builtin=marschner-lobb:13"] {
+        let stderr = drawn(other);
+        // The first frame of every turn is the same.
+        assert_eq!(stderr, if other == "--turn 90" { "1 of 3 frames are kept, drawn before" } else { "" }, "{other}");
+        assert_ne!(frames(), first, "{other}");
+        drawn("--overwrite");
+        assert_eq!(frames(), first, "{other}");
+    }
+    // A list is no image, and without it all frames are drawn.
+    folder.write("f#.png.made", [0xff; 1000]);
+    assert_eq!(drawn(""), "");
+    assert_eq!(frames(), first);
     folder.orbit(&format!("{TURNING} --count 3 -o f%d.png --overwrite --depth 16"));
     assert!(matches!(image::open(folder.path("f1.png")).unwrap(), image::DynamicImage::ImageRgba16(_)));
 }
@@ -184,7 +209,9 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
     }
     folder.run("orbit gone.toml -o %d.png").assert_failure(2, &["gone.toml"]);
     for output in ["no/%d.png", "no/out.gif"] {
-        folder.run(&format!("orbit {TURNING} --count 1 -o {output}")).assert_failure(1, &["no/", "No such file"]);
+        folder
+            .run(&format!("orbit {TURNING} --count 1 -o {output}"))
+            .assert_failure(2, &["no/", "the folder no: No such file"]);
     }
     folder.run(&format!("orbit {TURNING} -o out.apng --adapter nonesuch")).assert_failure(1, &["nonesuch", &adapter()]);
     assert_eq!(folder.names(), BTreeSet::new());

@@ -65,11 +65,30 @@ fn parts_that_exist_are_not_drawn_again() {
     let part = format!("{SCENE} -o part.exr --slabs -9..4");
     folder.render(&part);
     let first = folder.read("part.exr");
-    folder.write("part.exr", "kept");
-    folder.render(&part);
-    assert_eq!(folder.read("part.exr"), b"kept");
-    folder.render(&format!("{part} --overwrite"));
-    assert_eq!(folder.read("part.exr"), first);
+    let time = || fs::metadata(folder.path("part.exr")).unwrap().modified().unwrap();
+    let old = time();
+    let again = |arguments: &str| {
+        let run = folder.run(format!("render {part} {arguments}").trim());
+        run.assert_success();
+        run.stderr.contains("part.exr: kept, drawn before\n")
+    };
+    assert!(again("") && again("--set splatting.rasterizer=quads"));
+    assert_eq!((time(), folder.read("part.exr")), (old, first.clone()));
+    assert!(!again("--overwrite"));
+    // Names are not believed: empty and damaged parts are drawn again, and those of other scenes, volumes, slabs and pixels.
+    let mut damaged = first.clone();
+    let last = damaged.len() - 20;
+    damaged[last] ^= 1;
+    for bytes in [&b""[..], b"not a part", &first[..first.len() / 2], &damaged] {
+        folder.write("part.exr", bytes);
+        assert!(!again(""), "{} bytes", bytes.len());
+        assert_eq!(folder.read("part.exr"), first);
+    }
+    for other in ["--set shading.ambient=0.3", "--set volume.builtin=head:25", "--region 0,0,40,29"] {
+        assert!(!again(other), "{other}");
+        assert_ne!(folder.read("part.exr"), first, "{other}");
+        assert!(!again("") && folder.read("part.exr") == first, "{other}");
+    }
     assert_eq!(folder.names().len(), 1);
 }
 

@@ -35,6 +35,17 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
     assert!((1..=27).contains(&of("chunks_read")), "{stats}");
     assert_eq!(of("bytes_read") % 64, 0);
     assert!(of("chunk_bytes") <= 17 << 20, "{stats}");
+    // However many threads there are: memory decides how many draw.
+    let many = [("RAYON_NUM_THREADS", "16")];
+    for rest in
+        [format!("{stated} -o many.npy"), format!("{stated} -o many-after.npy --set splatting.classification=after")]
+    {
+        let arguments = format!("render {ball} {rest} --memory 17MiB --stats many.json");
+        folder.run_with(&many, "", &arguments).assert_success();
+        let stats: Value = serde_json::from_slice(&folder.read("many.json")).unwrap();
+        assert!((1..=17 << 20).contains(&stats["chunk_bytes"].as_u64().unwrap()), "{stats}");
+    }
+    assert!(folder.read("many.npy") == folder.read("whole.npy"), "the images differ");
     assert_eq!((of("sample_chunks_read"), of("sample_bytes_read")), (27, 4 * 192 * 160 * 155), "{stats}");
 
     // With an index the same bytes after splatting, too.

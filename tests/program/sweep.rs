@@ -130,10 +130,11 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
         assert_eq!(folder.names(), BTreeSet::new(), "{arguments}");
     }
     folder.run("sweep gone.toml -o s.png --set splatting.radius=1,2").assert_failure(2, &["gone.toml"]);
-    let fails =
-        |arguments: &str, words: &[&str]| folder.run(&format!("sweep {WIDE} {arguments}")).assert_failure(1, words);
-    fails("-o s.png --set splatting.radius=1,2 --adapter nonesuch", &["nonesuch", &adapter()]);
-    fails("-o no/s.png --set splatting.radius=1,2", &["no/s.png", "No such file"]);
+    let fails = |code: i32, arguments: &str, words: &[&str]| {
+        folder.run(&format!("sweep {WIDE} {arguments}")).assert_failure(code, words)
+    };
+    fails(1, "-o s.png --set splatting.radius=1,2 --adapter nonesuch", &["nonesuch", &adapter()]);
+    fails(2, "-o no/s.png --set splatting.radius=1,2", &["no/s.png", "the folder no: No such file"]);
     assert_eq!(folder.names(), BTreeSet::new());
 }
 

@@ -2,8 +2,10 @@
 
 use std::borrow::Cow;
 use std::fmt::{self, Debug, Display, Formatter};
-use std::io;
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::string::FromUtf8Error;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, PoisonError};
 
@@ -267,22 +269,34 @@ impl Access {
         }
     }
 
-    /// A file's text.
+    /// A file's text, of which no more than the maximum length in bytes is read.
     ///
     /// # Errors
-    /// If reading is confined and the path leads out of the folder; within, if the file cannot be read or is not UTF-8.
+    /// If reading is confined and the path leads out of the folder, or the file is longer; within, if the file cannot be read or is not UTF-8.
     #[doc(hidden)]
-    pub fn text(&self, path: &Path) -> Result<io::Result<String>, VolumeError> {
-        let utf8 = |bytes: &Arc<[u8]>| {
-            String::from_utf8(bytes.to_vec()).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
+    pub fn text(&self, path: &Path, most: u64) -> Result<io::Result<String>, VolumeError> {
+        let read = || {
+            let mut bytes = Vec::new();
+            let file = File::open(self.resolve(path)?).map_err(io_error(path))?;
+            file.take(most.saturating_add(1)).read_to_end(&mut bytes).map_err(io_error(path))?;
+            Ok(bytes)
         };
-        match self.given() {
-            Some(files) => Ok(files.get(path).and_then(utf8)),
-            None => {
-                self.check_input(path)?;
-                Ok(std::fs::read_to_string(self.resolve(path)?))
+        let bytes = match self.given() {
+            Some(files) => files.get(path).map(|bytes| bytes.to_vec()).map_err(io_error(path)),
+            None => self.check_input(path).and_then(|()| read()),
+        };
+        let bytes = match bytes.map_err(VolumeError::into_parts) {
+            Ok(bytes) => bytes,
+            Err(Ok((_, error))) => return Ok(Err(error)),
+            Err(Err([origin, field, found, allowed])) => {
+                return Err(VolumeError::invalid(origin, field, found, allowed));
             }
+        };
+        if bytes.len() as u64 > most {
+            return Err(invalid(path, "size", format!("more than {most} bytes"), format!("at most {most} bytes")));
         }
+        let not_utf8 = |error: FromUtf8Error| format!("found text that is not UTF-8: {}", error.utf8_error());
+        Ok(String::from_utf8(bytes).map_err(|error| io::Error::new(io::ErrorKind::InvalidData, not_utf8(error))))
     }
 
     /// Checks that a file is not one that will be written, and notes that it is read.

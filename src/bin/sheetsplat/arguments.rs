@@ -385,7 +385,7 @@ impl Input {
     }
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, PartialEq, ValueEnum)]
 pub(crate) enum Depth {
     #[value(name = "8")]
     Eight,

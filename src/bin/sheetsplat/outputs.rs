@@ -5,6 +5,7 @@ use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use sheetsplat::image::output::{Output, Target};
+use sheetsplat::internals::identity;
 use sheetsplat::volume;
 
 use crate::failure::Failure;
@@ -22,7 +23,7 @@ impl Outputs {
     pub(crate) fn check(files: &[Named<'_>], prints: bool, inputs: &[PathBuf]) -> Result<Self, Failure> {
         let outputs = Self::distinct(files.iter().map(|&(option, path)| (option, path.to_owned())), prints)?;
         outputs.refuse(inputs)?;
-        files.iter().try_for_each(|(_, path)| check_writable(path))?;
+        files.iter().try_for_each(|(_, path)| check_writable(path).and_then(|()| check_folder(path)))?;
         Ok(outputs)
     }
 
@@ -61,9 +62,29 @@ fn invalid(name: &str, other: &str) -> Failure {
     Failure::Input(format!("{name}: found the same file as {other}, allowed: another file"))
 }
 
-/// Checks that a path is writable.
+/// Checks that a path leads to a file that may be written, or to none, in a folder that exists.
 pub(crate) fn check_writable(path: &Path) -> Result<(), Failure> {
-    Target::of(path).map(|_| ()).map_err(failed(path))
+    check(path, |_| Ok(()))
+}
+
+/// Checks that the folder of a file takes new files.
+pub(crate) fn check_folder(path: &Path) -> Result<(), Failure> {
+    check(path, Target::check_folder)
+}
+
+/// Checks what a path leads to. A folder that is missing or may not be written is bad usage.
+fn check(path: &Path, check: impl Fn(Target) -> io::Result<()>) -> Result<(), Failure> {
+    let is_new = fs::symlink_metadata(path).is_err();
+    let target = match Target::of(path) {
+        Err(error) if is_new => return Err(bad_folder(path, &error)),
+        target => target.map_err(failed(path))?,
+    };
+    check(target).map_err(|error| bad_folder(path, &error))
+}
+
+fn bad_folder(path: &Path, error: &io::Error) -> Failure {
+    let folder = identity::folder(path).display();
+    Failure::Input(format!("{}: the folder {folder}: {error}, allowed: a folder that takes new files", path.display()))
 }
 
 /// Writes files and prints: all or nothing. Pipes, devices and standard output cannot be undone, so they are written last, before the

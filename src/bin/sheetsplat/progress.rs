@@ -1,8 +1,10 @@
 //! The progress line on the terminal.
 
+use std::io::Write;
 use std::sync::Arc;
 
 use indicatif::{ProgressBar, ProgressStyle};
+use sheetsplat::internals::plain;
 use sheetsplat::scene::OpenVolume;
 
 /// The line of steps: the bar, the number of steps done, the chunks read, and the time left if the others take equally long.
@@ -46,6 +48,16 @@ impl Progress {
             }
         };
         volume.watched_by(Arc::new(tell)).into()
+    }
+}
+
+/// Tells what a run does not do, on a line that stays, unless it is to be quiet.
+pub(crate) fn tell(is_wanted: bool, text: &str) {
+    if is_wanted {
+        // A closed terminal does not end the program.
+        _ = writeln!(std::io::stderr(), "{}", plain(text));
+    } else {
+        log::info!("{text}");
     }
 }
 

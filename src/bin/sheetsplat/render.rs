@@ -13,7 +13,7 @@ use crate::failure::Failure;
 use crate::memory::peak_rss_mib;
 use crate::outputs::{self, Outputs};
 use crate::parts::Part;
-use crate::progress::Progress;
+use crate::progress::{Progress, tell};
 
 #[derive(clap::Args)]
 #[command(after_help = "\
@@ -52,11 +52,6 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
     let Arguments { input, output, stats: stats_file, save_scene, .. } = arguments;
     check_files(arguments)?;
-    // Like a frame of `orbit`, a part is drawn once.
-    if arguments.part.is_done(output) {
-        log::info!("{}: there already", output.display());
-        return Ok(());
-    }
     let scene = input.scene()?;
     let mut named = vec![("--output", output.as_path())];
     named.extend(stats_file.as_deref().map(|path| ("--stats", path)));
@@ -69,11 +64,19 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let start = Instant::now();
     let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
+    let window = arguments.part.window(&scene);
+    // Like a frame of `orbit`, a part is drawn once.
+    if let Some(window) = &window
+        && arguments.part.is_done(output, input, (&volume, &scene), window)?
+    {
+        tell(progress, &format!("{}: kept, drawn before", output.display()));
+        return Ok(());
+    }
     let overlay = arguments.annotate.overlay(&scene, volume.sample())?;
     let is_streamed = matches!(volume, OpenVolume::Streamed(_));
     let bar = Progress::of_chunks(progress);
     let volume = bar.watch(volume);
-    let (bytes, mut stats) = match arguments.part.window(&scene) {
+    let (bytes, mut stats) = match window {
         Some(window) => {
             let (part, stats) = arguments.part.draw(input, volume, &scene, &window)?;
             (part.encode(output)?, stats)

@@ -23,10 +23,11 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::kernel::Kernel;
 use crate::lists::iso_range::ValueSet;
-use crate::parallel::{ThreadPoolBuilder, current_num_threads};
+use crate::parallel::{ThreadPool, ThreadPoolBuilder, current_num_threads};
 use crate::part::{self, Content, Part};
 use crate::rendering::Rendering;
 use crate::scene::Scene;
+use crate::scene::open::CHUNKS_OF_THREAD;
 use crate::settings::camera::Camera;
 use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
@@ -116,7 +117,7 @@ impl StreamRenderer {
         Ok(())
     }
 
-    /// Draws a frame on the threads of the current rayon pool, while others read. Neither their number nor the memory changes a bit of the
+    /// Draws a frame on the threads of the current rayon pool, or on fewer if memory holds chunks for fewer, while others read. Neither their number nor the memory changes a bit of the
     /// image. Of a volume classified after splatting voxels and sections are not counted.
     ///
     /// # Errors
@@ -161,6 +162,7 @@ impl StreamRenderer {
         start: Instant,
     ) -> Result<(Content, Stats), RenderError> {
         let (size, grid) = (view.size, *self.volume.grid());
+        let threads = self.threads();
         let stream = Arc::new(self.stream((scene, view), &window)?);
         let host = Host { window, is_part, first_hit: None, surfaces: None };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
@@ -169,10 +171,12 @@ impl StreamRenderer {
                 let (numbers, is_range_known) = self.numbers();
                 let matter = Matter::Streamed { stream: &stream, nothing: &nothing, numbers, is_range_known };
                 let frame = after::Frame::new(0, (matter, &self.transfer), scene, view, host);
-                self.check_held(frame.held_bytes())?;
-                after::Frame::draw(&[frame], self.level)
+                let threads = threads.min(self.holders(frame.held_bytes())?);
+                on_threads(threads, || after::Frame::draw(&[frame], self.level))?
             }
-            _ => Reused::default().draw((&grid, Voxels::Streamed(&stream)), scene, view, host, self.level),
+            _ => on_threads(threads, || {
+                Reused::default().draw((&grid, Voxels::Streamed(&stream)), scene, view, host, self.level)
+            })?,
         };
         if let Some(failure) = stream.pool.take_failure() {
             return Err(failure.into());
@@ -189,17 +193,31 @@ impl StreamRenderer {
         Ok((content, Stats { store: Some(store), ..statistics(self.simd, size, counts, start) }))
     }
 
-    /// Checks that the boxes of voxels fit into memory that threads copy from chunks, given the bytes of one.
-    fn check_held(&self, bytes: f64) -> Result<(), SettingError> {
-        let all = bytes * current_num_threads() as f64;
+    /// The number of threads that draw: as many as there are, or as memory holds the chunks of.
+    fn threads(&self) -> usize {
+        let most = self.volume.memory / self.chunk_bytes().saturating_mul(CHUNKS_OF_THREAD).max(1);
+        current_num_threads().min(usize::try_from(most).unwrap_or(usize::MAX)).max(1)
+    }
+
+    /// The bytes of a chunk's values.
+    fn chunk_bytes(&self) -> u64 {
+        let level = &self.values.store.levels()[self.values.level];
+        Source::side(level.chunk, &level.grid).as_u64vec3().element_product().saturating_mul(4)
+    }
+
+    /// The number of threads whose boxes of voxels fit into memory, which they copy from chunks, given the bytes of one.
+    ///
+    /// # Errors
+    /// If not even one fits.
+    fn holders(&self, bytes: f64) -> Result<usize, SettingError> {
         let memory = self.volume.memory.max(LEAST_HELD);
-        if all <= memory as f64 {
-            return Ok(());
+        let holders = memory as f64 / bytes;
+        if holders >= 1.0 {
+            return Ok(holders as usize);
         }
         let found =
             format!("{}, in which {COLUMNS}×{ROWS} pixels see a box of voxels of {bytes:.0} bytes", self.values.level);
-        let allowed =
-            format!("a coarser level, more pixels, or more memory than {memory} bytes for all threads' boxes");
+        let allowed = format!("a coarser level, more pixels, or more memory than {memory} bytes for a box");
         Err(SettingError::new("volume.level", found, allowed))
     }
 
@@ -215,13 +233,12 @@ impl StreamRenderer {
         let (StreamedLevel { store, level, .. }, memory) = (&self.values, self.volume.memory);
         let (splatting, grid) = (&scene.splatting, store.levels()[*level].grid);
         let slabs = window.with_lead(splatting.compositing, Classification::Before).slabs;
-        let threads = current_num_threads();
-        let readers = ThreadPoolBuilder::new().num_threads(threads.max(LEAST_READERS)).build();
-        let readers =
-            readers.map_err(|error| SettingError::new("threads", error.to_string(), "threads that can be started"))?;
+        let threads = self.threads();
         let side = Source::side(store.levels()[*level].chunk, &grid);
-        let chunk_bytes = side.as_u64vec3().element_product().saturating_mul(4);
-        let ahead = memory / chunk_bytes / (2 * threads as u64);
+        // A quarter of the memory for chunks that are being read.
+        let room = usize::try_from(memory / self.chunk_bytes().saturating_mul(4).max(1)).unwrap_or(usize::MAX);
+        let readers = pool(threads.max(LEAST_READERS).min(room).max(1))?;
+        let ahead = memory / self.chunk_bytes().max(1) / (2 * threads as u64);
         Ok(Stream {
             ahead: ahead.clamp(2, MOST_AHEAD) as usize,
             source: Source {
@@ -242,6 +259,16 @@ impl StreamRenderer {
             readers,
         })
     }
+}
+
+fn pool(threads: usize) -> Result<ThreadPool, SettingError> {
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+    pool.map_err(|error| SettingError::new("threads", error.to_string(), "threads that can be started"))
+}
+
+/// Draws on the current threads, or on fewer.
+fn on_threads<R: Send>(threads: usize, draw: impl FnOnce() -> R + Send) -> Result<R, SettingError> {
+    if threads >= current_num_threads() { Ok(draw()) } else { Ok(pool(threads)?.install(draw)) }
 }
 
 /// A scene for a volume's sample with its transfer function, once its classification is known.

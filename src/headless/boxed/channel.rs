@@ -220,8 +220,8 @@ fn counts_all(Splatting { compositing, classification, .. }: &Splatting) -> bool
 
 /// The values that have an opacity under the tables of any label of a channel.
 pub(in crate::headless) fn opaque_values(transfer: &TransferFunction) -> ValueSet {
-    let tables = transfer.labels.keys().map(|&label| transfer.tables(Some(label)));
-    tables.fold(ValueSet::of(transfer), |all, tables| all.union(&ValueSet::of_tables(&tables)))
+    let labels = transfer.labels.keys().map(|&label| Some(label)).chain([None]);
+    ValueSet::union_of(labels.map(|label| ValueSet::of_tables(&transfer.tables(label))))
 }
 
 /// A level of a store, and what has been read of it.

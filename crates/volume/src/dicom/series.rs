@@ -31,12 +31,17 @@ pub(super) fn check_one(folder: &Path, images: &[Image]) -> Result<(), VolumeErr
     for image in images {
         series.entry(&image.series).or_insert((0, &image.description)).0 += 1;
     }
-    let listed = series.iter().take(8).map(|(id, (count, description))| format!("{count} of {description} ({id})"));
+    let listed =
+        series.iter().take(LISTED).map(|(id, (count, description))| format!("{count} of {description} ({id})"));
     let found = match series.len() {
         0 => "no image".to_owned(),
         1 => return Ok(()),
         count => {
-            format!("{count} series: {}{}", listed.collect::<Vec<_>>().join(", "), if count > 8 { ", …" } else { "" })
+            format!(
+                "{count} series: {}{}",
+                listed.collect::<Vec<_>>().join(", "),
+                if count > LISTED { ", …" } else { "" }
+            )
         }
     };
     Err(invalid(folder, "SeriesInstanceUID", found, "the slices of one series"))
@@ -137,35 +142,45 @@ impl Series {
     }
 }
 
+/// The number of kinds of frames, and of series, that errors list.
+const LISTED: usize = 8;
+
 /// The first of some frames that share sizes and directions; refuses others with a list of both.
 fn check_alike<'a>(path: &Path, images: &'a [Image]) -> Result<&'a Frame, VolumeError> {
-    let mut kinds: Vec<(&Image, &Frame, usize)> = Vec::new();
-    for image in images {
-        for frame in &image.frames {
-            let is_like = |&&mut (other, kind, _): &&mut (&Image, &Frame, usize)| {
-                let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.max(b);
-                other.pixels.samples == image.pixels.samples
-                    && [other.pixels.columns, other.pixels.rows] == [image.pixels.columns, image.pixels.rows]
-                    && near(kind.spacing[0], frame.spacing[0])
-                    && near(kind.spacing[1], frame.spacing[1])
-                    && (0..2).all(|axis| kind.directions[axis].abs_diff_eq(frame.directions[axis], SAME))
-            };
-            match kinds.iter_mut().find(is_like) {
-                Some((_, _, count)) => *count += 1,
-                None => kinds.push((image, frame, 1)),
-            }
-        }
-    }
-    if let [(_, first, _)] = kinds.as_slice() {
+    let frames = images.iter().flat_map(|image| image.frames.iter().map(move |frame| (image, frame)));
+    let (kinds, others) = kinds_of(frames, |(other, kind), (image, frame)| {
+        let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.max(b);
+        other.pixels.samples == image.pixels.samples
+            && [other.pixels.columns, other.pixels.rows] == [image.pixels.columns, image.pixels.rows]
+            && near(kind.spacing[0], frame.spacing[0])
+            && near(kind.spacing[1], frame.spacing[1])
+            && (0..2).all(|axis| kind.directions[axis].abs_diff_eq(frame.directions[axis], SAME))
+    });
+    if let [((_, first), _)] = kinds.as_slice() {
         return Ok(first);
     }
-    let listed = kinds.iter().take(8).map(|(image, frame, count)| {
+    let listed = kinds.iter().map(|((image, frame), count)| {
         let ([x, y], [row, column]) = (frame.spacing, frame.directions);
         let (columns, rows) = (image.pixels.columns, image.pixels.rows);
         format!("{count} of {columns} × {rows}, {x} × {y} mm, along {row} and {column}")
     });
-    let found = listed.collect::<Vec<_>>().join("; ");
+    let others = (others > 0).then(|| format!("{others} of other kinds"));
+    let found = listed.chain(others).collect::<Vec<_>>().join("; ");
     Err(invalid(path, "slices", found, "slices of one size, one distance of pixels, and one orientation"))
+}
+
+/// The first kinds of some items, each with its first item and its number of items, and the number of items of other kinds. Every item is compared with
+/// the listed kinds alone.
+fn kinds_of<T>(items: impl Iterator<Item = T>, are_alike: impl Fn(&T, &T) -> bool) -> (Vec<(T, usize)>, usize) {
+    let (mut kinds, mut others) = (Vec::<(T, usize)>::new(), 0);
+    for item in items {
+        match kinds.iter().position(|(kind, _)| are_alike(kind, &item)) {
+            Some(kind) => kinds[kind].1 += 1,
+            None if kinds.len() < LISTED => kinds.push((item, 1)),
+            None => others += 1,
+        }
+    }
+    (kinds, others)
 }
 
 /// The steps between ascending positions.
@@ -196,4 +211,26 @@ fn median(steps: &[f64]) -> f64 {
     let mut sorted = steps.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted[sorted.len() / 2]
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    #[test]
+    fn kinds_are_counted_by_few_comparisons() {
+        let compared = Cell::new(0_usize);
+        let are_alike = |a: &u32, b: &u32| {
+            compared.set(compared.get() + 1);
+            a == b
+        };
+        let (kinds, others) = kinds_of((0..10_000).chain(0..3), are_alike);
+        assert_eq!(
+            (kinds, others),
+            ([2, 2, 2, 1, 1, 1, 1, 1].into_iter().enumerate().map(|(at, count)| (at as u32, count)).collect(), 9992)
+        );
+        assert!(compared.get() <= LISTED * 10_003, "{}", compared.get());
+    }
 }

@@ -5,7 +5,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use super::setting::SettingError;
-use crate::text::plain;
+use crate::text::{plain, without_passwords};
 
 /// Why a volume could not be loaded. Every message names the file (or builtin), the field, what was found and what is allowed.
 #[derive(Debug, thiserror::Error)]
@@ -38,7 +38,7 @@ pub enum VolumeError {
 impl VolumeError {
     /// The error of a file that could not be read, for [`Store`](crate::Store)s of other programs.
     pub fn io(path: impl Into<PathBuf>, source: std::io::Error) -> Self {
-        Self::Io { path: path.into(), source }
+        Self::Io { path: shown(path.into()), source }
     }
 
     /// `Ok` with the file and the system's error, or `Err` with the origin, the field, what was found and what is allowed.
@@ -57,8 +57,14 @@ impl VolumeError {
         found: impl Into<String>,
         allowed: impl Into<String>,
     ) -> Self {
-        Self::Invalid { origin: origin.into(), field: field.into(), found: found.into(), allowed: allowed.into() }
+        let [origin, found] = [origin.into(), found.into()].map(|text| without_passwords(&text).into_owned());
+        Self::Invalid { origin, field: field.into(), found, allowed: allowed.into() }
     }
+}
+
+/// A path as errors tell it: an address without its password.
+fn shown(path: PathBuf) -> PathBuf {
+    path.to_str().map(|text| without_passwords(text).into_owned().into()).unwrap_or(path)
 }
 
 /// The error for an invalid field of a file.
@@ -73,5 +79,5 @@ pub(crate) fn refused(origin: &str, error: SettingError) -> VolumeError {
 
 /// Makes the error of a file that could not be read.
 pub(crate) fn io_error(path: &Path) -> impl Fn(io::Error) -> VolumeError {
-    |source| VolumeError::Io { path: path.to_owned(), source }
+    move |source| VolumeError::io(path, source)
 }

@@ -198,6 +198,11 @@ impl ThreadPool {
     pub fn spawn(&self, work: impl FnOnce()) {
         work();
     }
+
+    #[expect(clippy::unused_self, reason = "rayon's threads belong to a pool")]
+    pub fn install<R>(&self, work: impl FnOnce() -> R) -> R {
+        work()
+    }
 }
 
 pub struct ThreadPoolBuilder;

@@ -17,7 +17,7 @@ use super::super::unit::{common, unit};
 use super::super::xml;
 use super::display;
 use super::pages::Pages;
-use super::stack::{Axis, Place, Run, Stack};
+use super::stack::{Axis, Place, Run, Runs, Stack};
 
 /// A resolution in pixels per inch that programs write by default, without meaning.
 const NOMINAL_DPI: f64 = 72.0;
@@ -33,7 +33,7 @@ pub(super) struct Calibration {
     /// What the pages show.
     pub(super) stack: Option<Stack>,
     /// Where pages are not in the stack's order.
-    pub(super) runs: Vec<Run>,
+    pub(super) runs: Runs,
     pub(super) channel_names: Vec<String>,
     pub(super) displays: Vec<ChannelDisplay>,
     /// Slope and intercept.
@@ -140,7 +140,7 @@ impl Calibration {
         // ImageJ omits a distance of 1.
         let between_slices = between.or((images > 1).then_some(1.0));
         let (stack, channel_names) = (Some(stack), Vec::new());
-        let (unit, runs) = (length_unit, Vec::new());
+        let (unit, runs) = (length_unit, Runs::default());
         Ok(Self { spacing, between_slices, unit, stack, runs, channel_names, displays, rescale })
     }
 
@@ -192,6 +192,7 @@ impl Calibration {
             return Err(pixels.invalid("SizeZ, SizeC, SizeT", found, allowed));
         }
         let runs = tiff_data.iter().map(|tiff_data| run(tiff_data, &stack)).collect::<Result<Vec<Run>, _>>()?;
+        let runs = Runs::new(&runs);
         let size = |name: &str| {
             pixels.value(name, "a positive finite number", |text| match text {
                 None => Some(None),

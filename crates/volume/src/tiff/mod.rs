@@ -18,7 +18,7 @@ use glam::DVec3;
 
 use self::description::Calibration;
 use self::pages::{Page, Pages};
-use self::stack::{Place, Run, Stack};
+use self::stack::{Place, Stack};
 use super::VolumeError;
 use super::access::Access;
 use super::error::volume::invalid;
@@ -46,7 +46,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     // The channel of a page among those that are read, and its slice.
     let wanted = |page: u32| {
         let alone = Place { slice: page, ..Place::default() };
-        let place = stack.map_or(alone, |stack| stack.place(Run::number_of(&calibration.runs, page)));
+        let place = stack.map_or(alone, |stack| stack.place(calibration.runs.number_of(page)));
         let is_read = place.time == selection.time.unwrap_or(0) && channels.contains(&place.channel);
         is_read.then(|| ((place.channel - channels.start) as usize, place.slice))
     };

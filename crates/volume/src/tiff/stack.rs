@@ -1,5 +1,9 @@
 //! The order of a file's pages: slices, channels and times.
 
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::ops::Range;
+
 use super::super::series::{MAX_CHANNELS, Series, SeriesOrder};
 
 /// How many slices, channels and times the pages show, and in which order they come.
@@ -38,14 +42,49 @@ pub(super) struct Run {
     pub(super) count: u32,
 }
 
-impl Run {
+/// The pages of all runs. A page that several runs hold belongs to the first of these.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Runs(Vec<Piece>);
+
+/// Pages of one run.
+#[derive(Clone, Debug, PartialEq)]
+struct Piece {
+    pages: Range<u64>,
+    /// The number of the first page.
+    number: u64,
+}
+
+impl Runs {
+    /// Cuts the runs into pieces that share no pages, in the order of their pages, by one walk over all first and last pages.
+    pub(super) fn new(runs: &[Run]) -> Self {
+        let numbers = |run: &Run| u64::from(run.count).min((1 << 32) - u64::from(run.number));
+        let pages = |run: &Run| u64::from(run.page)..u64::from(run.page) + numbers(run);
+        let mut starts: Vec<(u64, usize)> = runs.iter().enumerate().map(|(at, run)| (pages(run).start, at)).collect();
+        let mut ends: Vec<u64> = runs.iter().map(pages).flat_map(|pages| [pages.start, pages.end]).collect();
+        starts.sort_unstable();
+        ends.sort_unstable();
+        ends.dedup();
+        let (mut open, mut starts, mut pieces) = (BinaryHeap::new(), starts.into_iter().peekable(), Vec::new());
+        for pair in ends.windows(2) {
+            while let Some((_, at)) = starts.next_if(|&(start, _)| start <= pair[0]) {
+                open.push(Reverse(at));
+            }
+            while open.peek().is_some_and(|&Reverse(at)| pages(&runs[at]).end <= pair[0]) {
+                open.pop();
+            }
+            if let Some(&Reverse(first)) = open.peek() {
+                let number = u64::from(runs[first].number) + pair[0] - u64::from(runs[first].page);
+                pieces.push(Piece { pages: pair[0]..pair[1], number });
+            }
+        }
+        Self(pieces)
+    }
+
     /// The number of a page in the stack's order: that of the first run that holds it, or else its own.
-    pub(super) fn number_of(runs: &[Self], page: u32) -> u32 {
-        let within = |run: &Self| {
-            let at = page.checked_sub(run.page).filter(|&at| at < run.count)?;
-            run.number.checked_add(at)
-        };
-        runs.iter().find_map(within).unwrap_or(page)
+    pub(super) fn number_of(&self, page: u32) -> u32 {
+        let at = self.0.partition_point(|piece| piece.pages.end <= page.into());
+        let piece = self.0.get(at).filter(|piece| piece.pages.start <= page.into());
+        piece.map_or(page, |piece| (piece.number + u64::from(page) - piece.pages.start) as u32)
     }
 }
 
@@ -135,10 +174,19 @@ mod tests {
 
     #[test]
     fn runs_of_pages() {
-        let runs = [Run { page: 4, number: 0, count: 2 }, Run { page: 0, number: 2, count: 3 }];
-        let numbers: Vec<u32> = (0..8).map(|page| Run::number_of(&runs, page)).collect();
+        let runs = Runs::new(&[Run { page: 4, number: 0, count: 2 }, Run { page: 0, number: 2, count: 3 }]);
+        let numbers: Vec<u32> = (0..8).map(|page| runs.number_of(page)).collect();
         assert_eq!(numbers, [2, 3, 4, 3, 0, 1, 6, 7]);
-        let all = [Run { page: 0, number: 0, count: u32::MAX }];
-        assert_eq!(Run::number_of(&all, u32::MAX), u32::MAX);
+        let all = Runs::new(&[Run { page: 0, number: 0, count: u32::MAX }]);
+        assert_eq!(all.number_of(u32::MAX), u32::MAX);
+        // Every run is shorter than all before it, which hold its pages too, and begins where none did.
+        let count = 100_000;
+        let nested = (0..count).map(|at| Run { page: count - at, number: at, count: 2 * at }).collect::<Vec<_>>();
+        let numbers = Runs::new(&nested);
+        assert!(numbers.0.len() <= 2 * nested.len(), "{}", numbers.0.len());
+        for page in (0..2 * count).step_by(1001) {
+            let within = |run: &Run| page.checked_sub(run.page).filter(|&at| at < run.count).map(|at| run.number + at);
+            assert_eq!(numbers.number_of(page), nested.iter().find_map(within).unwrap_or(page), "{page}");
+        }
     }
 }

@@ -56,6 +56,8 @@ pub(super) struct ZarrArray {
     chunk: Sizes,
     /// The number of values in a chunk.
     in_chunk: u64,
+    /// The maximum number of chunks that are read at once, however many threads there are.
+    most_at_once: usize,
 }
 
 impl Debug for ZarrArray {
@@ -140,6 +142,7 @@ impl ZarrArray {
         let (shape, chunk) = (axes.sort(&shape, 1), axes.sort(inner, 1));
         let (keys, path) = (Arc::clone(keys), path.to_owned());
         let opened = Self {
+            most_at_once: usize::MAX,
             keys,
             path,
             metadata,
@@ -191,6 +194,17 @@ impl ZarrArray {
         let all: u64 = (0..KINDS).map(|axis| self.shape[axis].div_ceil(self.chunk[axis])).product();
         let indices = if self.shards.is_some() { 32 * all.min(MAX_IN_SHARD) } else { 0 };
         bytes.saturating_add(indices)
+    }
+
+    /// Reads no more chunks at once than memory of some bytes holds, or one.
+    pub(super) fn keep_within<T>(&mut self, bytes: u64) {
+        let threads = parallel::current_num_threads();
+        self.most_at_once = (1..=threads).rev().find(|&chunks| self.chunk_memory::<T>(chunks) <= bytes).unwrap_or(1);
+    }
+
+    /// The maximum number of chunks that are read at once.
+    pub(super) fn most_at_once(&self) -> usize {
+        parallel::current_num_threads().min(self.most_at_once)
     }
 
     /// Reserves the memory for reading `chunks` chunks at once.
@@ -254,7 +268,7 @@ impl ZarrArray {
 
     /// The number of chunks that are decoded at once to read a region.
     pub(super) fn at_once(&self, region: &Region) -> usize {
-        parallel::current_num_threads().min(self.count(region) as usize)
+        self.most_at_once().min(self.count(region) as usize)
     }
 
     /// Reads a region that lies in the array, channel by channel, x fastest, into as many values. Returns what the store

@@ -2,12 +2,12 @@
 
 use std::collections::HashMap;
 use std::fmt::Write;
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::thread::sleep;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use ureq::http::Response;
 use ureq::http::header::{ACCEPT_ENCODING, CONTENT_RANGE, RANGE};
@@ -25,8 +25,25 @@ const ATTEMPTS: u32 = 3;
 /// The time before a request is sent again; before each further one it is four times as long.
 const PAUSE: Duration = Duration::from_millis(200);
 
-/// The longest time in which a server sends nothing, and that for a whole request.
-const TIME_LIMITS: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(300)];
+/// What is waited for.
+const LIMITS: Limits = Limits {
+    silence: Duration::from_secs(30),
+    whole: Duration::from_secs(300),
+    start: Duration::from_secs(30),
+    bytes_per_second: 1024,
+};
+
+/// How long a server may take. Without a least rate, one that sends a byte now and then would be waited for with every key anew.
+#[derive(Clone, Copy)]
+struct Limits {
+    /// The longest time in which it sends nothing.
+    silence: Duration,
+    /// The longest time for a request.
+    whole: Duration,
+    /// The time from which on an answer must have come at the least rate.
+    start: Duration,
+    bytes_per_second: u64,
+}
 
 /// The number of connections that are kept for further requests.
 const CONNECTIONS: usize = 16;
@@ -41,7 +58,7 @@ pub(super) struct Http {
     root: String,
     /// What follows the keys: a question mark and a query, or nothing.
     query: String,
-    time_limit: Duration,
+    limits: Limits,
     /// The lengths of values that are known; `None` for keys that the store does not hold.
     lengths: Mutex<HashMap<String, Option<u64>>>,
 }
@@ -62,10 +79,10 @@ impl From<VolumeError> for Failure {
 impl Http {
     /// The store at an address.
     pub(super) fn new(address: &Path) -> Result<Self, VolumeError> {
-        Self::within(address, TIME_LIMITS)
+        Self::within(address, LIMITS)
     }
 
-    fn within(address: &Path, [silence, whole]: [Duration; 2]) -> Result<Self, VolumeError> {
+    fn within(address: &Path, limits: Limits) -> Result<Self, VolumeError> {
         let allowed = "an address without #, in UTF-8";
         let text = address.to_str().filter(|text| !text.contains('#'));
         let text = text.ok_or_else(|| invalid(address, "address", "another one", allowed))?;
@@ -76,15 +93,16 @@ impl Http {
             // What is asked for in secret must not be answered in the open. No other scheme is known to the client.
             .https_only(text.get(..6).is_some_and(|scheme| scheme.eq_ignore_ascii_case("https:")))
             .max_redirects(MAX_REDIRECTS)
-            .timeout_global(Some(whole))
-            .timeout_per_read(Some(silence))
-            .timeout_connect(Some(silence))
+            .timeout_global(Some(limits.whole))
+            .timeout_per_read(Some(limits.silence))
+            .timeout_connect(Some(limits.silence))
+            .timeout_recv_response(Some(limits.silence))
             .max_idle_connections(CONNECTIONS)
             .max_idle_connections_per_host(CONNECTIONS)
             .user_agent(concat!("sheetsplat/", env!("CARGO_PKG_VERSION")))
             .build();
         let (agent, lengths) = (Agent::new_with_config(config), Mutex::default());
-        Ok(Self { agent, root: root.trim_end_matches('/').to_owned(), query, time_limit: silence, lengths })
+        Ok(Self { agent, root: root.trim_end_matches('/').to_owned(), query, limits, lengths })
     }
 
     /// The place of a key, for errors: without the query, which may be a secret.
@@ -219,11 +237,22 @@ impl Http {
     /// Reads `count` bytes, and one more if there is one: at the end of an answer its connection can be used again.
     fn read(&self, key: &str, response: &mut Response<Body>, count: u64) -> Result<Vec<u8>, Failure> {
         let mut bytes = Vec::new();
-        let reader = response.body_mut().as_reader();
-        match reader.take(count.saturating_add(1)).read_to_end(&mut bytes) {
-            Ok(_) => Ok(bytes),
-            // ureq's own errors pass through the reader.
-            Err(error) => Err(self.failure(key, Error::from(error))),
+        let mut reader = response.body_mut().as_reader().take(count.saturating_add(1));
+        let (begin, mut piece, Limits { start, bytes_per_second, .. }) = (Instant::now(), [0; 1 << 14], self.limits);
+        loop {
+            match reader.read(&mut piece) {
+                Ok(0) => return Ok(bytes),
+                Ok(length) => bytes.extend(&piece[..length]),
+                Err(error) if error.kind() == ErrorKind::Interrupted => {}
+                // ureq's own errors pass through the reader.
+                Err(error) => return Err(self.failure(key, Error::from(error))),
+            }
+            let time = begin.elapsed();
+            if time > start && (bytes.len() as f64) < bytes_per_second as f64 * time.as_secs_f64() {
+                let found = format!("{} bytes in {time:.0?}", bytes.len());
+                let allowed = format!("an answer of at least {bytes_per_second} bytes a second");
+                return Err(Failure::Lasting(invalid(&self.place(key), "address", found, allowed)));
+            }
         }
     }
 
@@ -238,7 +267,7 @@ impl Http {
         match error {
             Error::Timeout(_) => {
                 let found = format!("no answer in time ({error})");
-                let allowed = format!("an answer that stops for at most {:?}", self.time_limit);
+                let allowed = format!("an answer that stops for at most {:?}", self.limits.silence);
                 Failure::Lasting(invalid(&place, "address", found, allowed))
             }
             Error::TooManyRedirects | Error::RedirectFailed | Error::BadUri(_) | Error::RequireHttpsOnly(_) => {
@@ -304,14 +333,22 @@ mod tests {
         });
         // Only one of the limits can be reached, however slow this machine is.
         let (short, long) = (Duration::from_millis(300), Duration::from_secs(3600));
-        for (limits, allowed) in [([short, long], "300ms"), ([short, long], "300ms"), ([long, short], "3600s")] {
-            let store = Http::within(Path::new(&address), limits).unwrap();
+        for ([silence, whole], allowed) in
+            [([short, long], "300ms"), ([short, long], "300ms"), ([long, short], "3600s")]
+        {
+            let store = Http::within(Path::new(&address), Limits { silence, whole, ..LIMITS }).unwrap();
             let message = store.whole("zarr.json", 1000).unwrap_err().to_string();
             let found = format!("{address}/zarr.json: address: found no answer in time");
             assert!(message.starts_with(&found), "{message}");
             let allowed = format!("allowed: an answer that stops for at most {allowed}");
             assert!(message.ends_with(&allowed), "{message}");
         }
+        // No server is that fast.
+        let limits = Limits { silence: long, whole: long, start: Duration::ZERO, bytes_per_second: u64::MAX };
+        let store = Http::within(Path::new(&address), limits).unwrap();
+        let message = store.whole("zarr.json", 1000).unwrap_err().to_string();
+        assert!(message.starts_with(&format!("{address}/zarr.json: address: found ")), "{message}");
+        assert!(message.contains(" bytes in ") && message.contains("bytes a second"), "{message}");
     }
 
     #[test]

@@ -15,6 +15,7 @@ use super::super::source::{MAX_HEADER, Source};
 use super::super::zip::{Directory, Member};
 #[cfg(feature = "http")]
 use super::http::Http;
+use super::listings::Listings;
 
 /// A store's keys.
 pub(super) struct Keys {
@@ -27,7 +28,7 @@ pub(super) struct Keys {
 }
 
 enum Place {
-    Folder,
+    Folder(Listings),
     /// An archive's files by their names, and what the names of the store's keys begin with.
     Archive(BTreeMap<String, Member>, String),
     #[cfg(feature = "http")]
@@ -43,7 +44,7 @@ impl Debug for Keys {
 impl Keys {
     /// The keys of the files in a folder.
     pub(super) fn of_folder(path: &Path, access: &Access) -> Self {
-        Self::new(path, Place::Folder, access)
+        Self::new(path, Place::Folder(Listings::default()), access)
     }
 
     /// The keys of an archive's files whose names begin with those of a folder.
@@ -80,7 +81,7 @@ impl Keys {
     /// The place of a key, for errors.
     pub(super) fn file(&self, key: &str) -> PathBuf {
         match &self.place {
-            Place::Folder | Place::Archive(..) => self.path.join(key),
+            Place::Folder(_) | Place::Archive(..) => self.path.join(key),
             #[cfg(feature = "http")]
             Place::Address(http) => http.place(key),
         }
@@ -103,7 +104,7 @@ impl Keys {
     /// The length of a key's value; `None` if the store has no such key.
     pub(super) fn bytes(&self, key: &str) -> Result<Option<u64>, VolumeError> {
         match &self.place {
-            Place::Folder => self.open(key)?.map(|mut file| file.left()).transpose(),
+            Place::Folder(listings) => self.open(key, listings)?.map(|mut file| file.left()).transpose(),
             Place::Archive(members, prefix) => Ok(members.get(&format!("{prefix}{key}")).map(|member| member.bytes)),
             #[cfg(feature = "http")]
             Place::Address(http) => http.length(key),
@@ -132,8 +133,8 @@ impl Keys {
         }
         let missing = || io_error(&path)(ErrorKind::NotFound.into());
         match &self.place {
-            Place::Folder => {
-                let mut file = self.open(key)?.ok_or_else(missing)?;
+            Place::Folder(listings) => {
+                let mut file = self.open(key, listings)?.ok_or_else(missing)?;
                 let mut bytes = Vec::new();
                 file.reader.seek(SeekFrom::Start(range.start)).map_err(io_error(&path))?;
                 file.reader.take(count).read_to_end(&mut bytes).map_err(io_error(&path))?;
@@ -166,17 +167,29 @@ impl Keys {
     }
 
     /// Opens the file of a key in a folder; `None` if the folder has no such file.
-    fn open(&self, key: &str) -> Result<Option<Source>, VolumeError> {
+    ///
+    /// # Errors
+    /// If the file cannot be opened, or has been removed since the store was opened.
+    fn open(&self, key: &str, listings: &Listings) -> Result<Option<Source>, VolumeError> {
         let path = self.file(key);
+        let is_listed = listings.have(key, &self.path, &self.access)?;
+        if is_listed == Some(false) {
+            return Ok(None);
+        }
         if self.access.given().is_none() && is_missing(&path) {
             // A link that leads nowhere is refused as one that leads out of the folder to which reading is confined.
             let nearest = path.ancestors().find(|path| fs::symlink_metadata(path).is_ok());
             nearest.map(|nearest| self.access.resolve(nearest)).transpose()?;
+            if is_listed == Some(true) && nearest != Some(&path) {
+                return Err(io_error(&path)(ErrorKind::NotFound.into()));
+            }
             return Ok(None);
         }
         match self.access.open(&path) {
             Ok(file) => Ok(Some(file)),
-            Err(VolumeError::Io { source, .. }) if source.kind() == ErrorKind::NotFound => Ok(None),
+            Err(VolumeError::Io { source, .. }) if source.kind() == ErrorKind::NotFound && is_listed.is_none() => {
+                Ok(None)
+            }
             Err(error) => Err(error),
         }
     }

@@ -15,6 +15,7 @@ mod http;
 mod image;
 mod json;
 mod keys;
+mod listings;
 mod metadata;
 mod multiscale;
 mod number;
@@ -37,16 +38,17 @@ use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
 use super::voxel::{Many, Voxel};
 use super::{Grid, StoreFacts, Values, VolumeError};
 use crate::StoreCounts;
-use crate::parallel;
 
 /// Reads an image at one level.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
-    let image = Image::open(path, access)?;
+    let mut image = Image::open(path, access)?;
     let selection = access.selection();
     image.series.check(path, selection)?;
     let channels = image.series.channels(selection);
     let channels = u64::from(channels.start)..u64::from(channels.end);
     let number = level_of::<T>(&image, channels.end - channels.start, path, access)?;
+    let bytes = image.levels[number].array.memory::<T>(channels.end - channels.start);
+    image.levels[number].array.keep_within::<T>(access.memory_left().saturating_sub(bytes));
     let level = &image.levels[number];
     let array = &level.array;
     let dims = level.grid.dims;
@@ -54,7 +56,6 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let count = (channels.end - channels.start) * u64::from(voxels);
     let time = u64::from(selection.time.unwrap_or(0));
     let pieces = array.pieces::<T>(channels.clone(), time);
-    let bytes = array.memory::<T>(channels.end - channels.start);
     let found = format!("{} × {} × {} voxels of {} channels", dims.x, dims.y, dims.z, count / u64::from(voxels));
     access.reserve(path, "data", found, bytes)?;
     let at_once = pieces.iter().map(|piece| array.at_once(piece)).max().unwrap_or(0);
@@ -131,12 +132,15 @@ fn level_of<T: Voxel>(image: &Image, channels: u64, path: &Path, access: &Access
 
 /// Opens the selected channels of an image at one time. `format` is the name of the format.
 pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
-    let image = Arc::new(Image::open(path, access)?);
+    let mut image = Image::open(path, access)?;
     let selection = access.selection();
     image.series.check(path, selection)?;
-    for level in &image.levels {
-        level.array.reserve::<f32>(parallel::current_num_threads(), access)?;
+    let share = access.memory_left() / (4 * image.levels.len() as u64).max(1);
+    for level in &mut image.levels {
+        level.array.keep_within::<f32>(share);
+        level.array.reserve::<f32>(level.array.most_at_once(), access)?;
     }
+    let image = Arc::new(image);
     let levels = image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() });
     let levels: Vec<StoreLevel> = levels.collect();
     let spacing = Some(image.levels[0].grid.spacing);
@@ -186,7 +190,7 @@ impl Store for ZarrStore {
 
     fn memory(&self, level: usize) -> u64 {
         let Some(Level { array, .. }) = self.image.levels.get(level) else { return 0 };
-        array.memory::<f32>(1).saturating_add(array.chunk_memory::<f32>(parallel::current_num_threads()))
+        array.memory::<f32>(1).saturating_add(array.chunk_memory::<f32>(array.most_at_once()))
     }
 
     fn facts(&self) -> StoreFacts {

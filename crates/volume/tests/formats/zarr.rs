@@ -94,6 +94,35 @@ fn missing_chunks_have_the_fill_value() {
     assert!((1..1000).contains(&read), "{read}");
 }
 
+/// A store that is gone is no store without chunks, nor is one that lost a chunk.
+#[test]
+fn stores_that_are_removed_are_errors() {
+    let folder = Folder::new();
+    let store = folder.0.path().join("a.zarr");
+    let metadata = json!({
+        "zarr_format": 3, "node_type": "array", "shape": [4, 4, 4], "data_type": "uint8", "fill_value": 7,
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [2, 2, 2]}},
+        "chunk_key_encoding": {"name": "default"}, "codecs": [{"name": "bytes"}],
+    });
+    fs::create_dir_all(store.join("c/0/0")).unwrap();
+    fs::write(store.join("zarr.json"), metadata.to_string()).unwrap();
+    fs::write(store.join("c/0/0/0"), [1; 8]).unwrap();
+    let open = || open_store(&store, &ReadOptions::default()).unwrap();
+    let [one, another] = [open(), open()];
+    let read = |store: &dyn sheetsplat_volume::Store, from: UVec3| {
+        let mut value = [0.0];
+        store.read(0, from, UVec3::ONE, &mut value).map(|_| value[0])
+    };
+    assert_eq!([UVec3::ZERO, UVec3::splat(2)].map(|from| read(&*one, from).unwrap()), [1.0, 7.0]);
+    fs::remove_file(store.join("c/0/0/0")).unwrap();
+    let message = read(&*one, UVec3::ZERO).unwrap_err().to_string();
+    assert!(message.contains("c/0/0/0: ") && message.contains("not found"), "{message}");
+    assert_eq!(read(&*one, UVec3::splat(2)).unwrap(), 7.0);
+    fs::remove_dir_all(&store).unwrap();
+    let message = read(&*another, UVec3::splat(2)).unwrap_err().to_string();
+    assert!(message.contains("a.zarr/c: No such file"), "{message}");
+}
+
 /// Version 2 may leave open what voxels are whose chunk is absent.
 #[test]
 fn chunks_without_a_fill_value_must_be_there() {

@@ -105,6 +105,15 @@ fn place(
 }
 
 impl Overlay {
+    /// Adds what is drawn to a hash.
+    pub(crate) fn add_to(&self, hash: &mut blake3::Hasher) {
+        for ([x, y], Image { width, height, pixels }) in &self.0 {
+            [x, y, width, height].iter().for_each(|number| _ = hash.update(&number.to_le_bytes()));
+            let bytes: Vec<u8> = pixels.iter().flatten().flat_map(|channel| channel.to_le_bytes()).collect();
+            hash.update(&bytes);
+        }
+    }
+
     pub(crate) fn draw(&self, image: &mut Image) {
         for (corner, plate) in &self.0 {
             lay(image, *corner, plate);

@@ -1,23 +1,28 @@
 //! `sheetsplat orbit`: turntables.
 
+mod made;
 mod movie;
 mod numbered;
 mod y4m;
 
+use std::cell::Cell;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use sheetsplat::RenderError;
+use sheetsplat::headless::HeadlessView;
 use sheetsplat::image::Image;
 use sheetsplat::image::output::Target;
+use sheetsplat::internals::fingerprint;
 use sheetsplat::scene::{OpenVolume, Scene};
 
 use crate::annotate::{Annotate, Overlay};
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, parse_range, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
-use crate::progress::Progress;
+use crate::progress::{Progress, tell};
+use made::Made;
 use movie::{Encoder, Format, Settings};
 use numbered::Pattern;
 use y4m::Chroma;
@@ -49,7 +54,7 @@ pub(crate) struct Arguments {
     /// frame from it, and any other frame with camera.direction turned.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
-    /// Draw numbered images again that already exist.
+    /// Draw numbered images again that were drawn before. Without it they are kept if they show the same and are whole.
     #[arg(long)]
     overwrite: bool,
     /// Frames per second of a movie.
@@ -84,22 +89,34 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         Failure::Input(format!("--output: found {}, allowed: {allowed}", output.display()))
     })?;
     Image::check_format(output)?;
-    let wanted = frames.len();
     let scene_file = arguments.save_scene.iter().map(|path| ("--save-scene", path.clone()));
-    let named = frames.clone().map(|frame| ("--output", pattern.path(frame))).chain(scene_file);
-    let outputs = Outputs::distinct(named, false)?;
+    let named = frames.clone().map(|frame| ("--output", pattern.path(frame)));
+    let named: Vec<_> = named.chain([("--output", pattern.list())]).chain(scene_file).collect();
+    let outputs = Outputs::distinct(named.iter().cloned(), false)?;
     outputs.refuse(&input.files(&scene))?;
-    let frames: Vec<u32> = frames.filter(|&frame| *overwrite || !pattern.path(frame).exists()).collect();
-    log::info!("{} of {wanted} frames are there already", wanted - frames.len());
-    frames.iter().try_for_each(|&frame| outputs::check_writable(&pattern.path(frame)))?;
-    arguments.save_scene.iter().try_for_each(|path| outputs::check_writable(path))?;
-    if frames.is_empty() && arguments.save_scene.is_none() {
-        return Ok(());
+    named.iter().try_for_each(|(_, path)| outputs::check_writable(path))?;
+    // All frames are in one folder.
+    outputs::check_folder(&pattern.list())?;
+    arguments.save_scene.iter().try_for_each(|path| outputs::check_folder(path))?;
+    let made = Made::open(pattern.list()).map_err(outputs::failed(&pattern.list()))?;
+    let frames: Vec<u32> = frames.collect();
+    let kept = Cell::new(0_usize);
+    let is_kept = |frame: u32, shown: blake3::Hash| {
+        let is_kept = !overwrite && made.has(shown, &pattern.path(frame));
+        kept.set(kept.get() + usize::from(is_kept));
+        is_kept
+    };
+    let (shown, volume) = Shown::load(arguments, (scene, times), &outputs, true)?;
+    shown.draw(arguments, (volume, &frames), progress, is_kept, |frame, shown, image| {
+        let path = pattern.path(frame);
+        let bytes = image.encode(&path, arguments.depth.into())?;
+        outputs::write(&[(&path, bytes.clone())], &[])?;
+        made.add(shown, &bytes).map_err(outputs::failed(made.path()))
+    })?;
+    if kept.get() > 0 {
+        tell(progress, &format!("{} of {} frames are kept, drawn before", kept.get(), frames.len()));
     }
-    let shown = Shown::load(arguments, (scene, times), &outputs)?;
-    shown.draw(arguments, &frames, progress, |frame, image| {
-        Ok(image.save(&pattern.path(frame), arguments.depth.into())?)
-    })
+    Ok(())
 }
 
 fn movie(
@@ -126,10 +143,16 @@ fn movie(
     let named: Vec<_> = output_file.into_iter().chain(scene_file).collect();
     let outputs = Outputs::check(&named, is_printed, &input.files(&scene))?;
     // The volume is loaded before anything is written, because the files it was read from are then known.
-    let shown = Shown::load(arguments, (scene, times), &outputs)?;
-    let encode = |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
+    let (shown, volume) = Shown::load(arguments, (scene, times), &outputs, false)?;
+    let encode = move |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
         let mut encoder = Encoder::new(format, &settings, &mut *to).map_err(failed)?;
-        shown.draw(arguments, &frames, progress, |_, image| encoder.add(image).map_err(failed))?;
+        shown.draw(
+            arguments,
+            (volume, &frames),
+            progress,
+            |_, _| false,
+            |_, _, image| encoder.add(image).map_err(failed),
+        )?;
         encoder.finish().and_then(|()| to.flush()).map_err(failed)
     };
     if is_printed {
@@ -145,19 +168,21 @@ fn movie(
 struct Shown<'a> {
     /// With everything stated that depends on the volume, at the first time.
     scene: Scene,
-    /// At the first time.
-    volume: OpenVolume,
     times: Option<Range<u32>>,
     overlay: Overlay,
     outputs: &'a Outputs,
+    /// Whether frames that were drawn before may be kept, for which their hashes are needed.
+    is_resumed: bool,
 }
 
 impl<'a> Shown<'a> {
+    /// What they show, and the volume at the first time.
     fn load(
         arguments: &Arguments,
         (scene, times): (Scene, Option<Range<u32>>),
         outputs: &'a Outputs,
-    ) -> Result<Self, Failure> {
+        is_resumed: bool,
+    ) -> Result<(Self, OpenVolume), Failure> {
         let Arguments { input, annotate, .. } = arguments;
         let scene = input.choose_levels(&scene, Scene::explicit_all_around)?;
         let volume = input.open_volume(&scene, outputs)?;
@@ -168,7 +193,7 @@ impl<'a> Shown<'a> {
         }
         let scene = input.settled(volume.sample(), &scene, Scene::explicit_all_around)?;
         let overlay = annotate.overlay(&scene, volume.sample())?;
-        Ok(Self { scene, volume, times, overlay, outputs })
+        Ok((Self { scene, times, overlay, outputs, is_resumed }, volume))
     }
 
     /// The time that a frame shows: all times take turns over all frames.
@@ -178,42 +203,86 @@ impl<'a> Shown<'a> {
         Some(start + steps as u32)
     }
 
-    /// Draws frames and passes them on. Each is independent of the others. No more than one time is in memory.
+    /// The hash of what frames of a volume show beside their own directions: the scene, what is drawn over it, and the bits of its pixels.
+    fn hash(&self, volume: &OpenVolume, depth: Depth) -> Result<blake3::Hasher, Failure> {
+        let mut hash = blake3::Hasher::new();
+        if !self.is_resumed {
+            return Ok(hash);
+        }
+        hash.update(fingerprint(volume, &self.scene)?.as_bytes());
+        hash.update(&[u8::from(depth == Depth::Sixteen)]);
+        self.overlay.add_to(&mut hash);
+        Ok(hash)
+    }
+
+    /// Draws frames and passes them on, except those that are kept, given the hash of what they show. Each is independent of the others. No more than one
+    /// time is in memory.
     fn draw(
-        self,
+        &self,
         arguments: &Arguments,
-        frames: &[u32],
+        (volume, frames): (OpenVolume, &[u32]),
         progress: bool,
-        mut take: impl FnMut(u32, &Image) -> Result<(), Failure>,
+        is_kept: impl Fn(u32, blake3::Hash) -> bool,
+        mut take: impl FnMut(u32, blake3::Hash, &Image) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
-        let Arguments { input, turn, count, save_scene, .. } = arguments;
-        let times: Vec<Option<u32>> = frames.iter().map(|&frame| self.time_of(frame, *count)).collect();
-        let Self { scene, volume, overlay, outputs, .. } = self;
-        let headless = input.headless(false, [&scene])?;
+        let Arguments { input, turn, count, save_scene, depth, .. } = arguments;
         let progress = Progress::new(frames.len(), progress);
-        let view = headless.view(progress.watch(volume), &scene).map_err(|error| input.failure(error))?;
-        let mut shown = (scene.time, Some(view));
-        for (&frame, time) in frames.iter().zip(times) {
-            if let Some(time) = time.filter(|&time| shown.0 != Some(time)) {
+        let scene = &self.scene;
+        let mut current = Current { time: scene.time, hash: self.hash(&volume, *depth)?, ..Current::default() };
+        current.volume = Some(progress.watch(volume));
+        let mut headless = None;
+        for &frame in frames {
+            if let Some(time) = self.time_of(frame, *count).filter(|&time| current.time != Some(time)) {
                 // The old view is dropped before the next time is read.
-                shown = (Some(time), None);
-                let volume = progress.watch(input.read_volume(&at_time(&scene, time), outputs)?);
-                shown.1 = Some(headless.view(volume, &scene).map_err(|error| input.failure(error))?);
+                current = Current { time: Some(time), ..Current::default() };
+                let volume = input.read_volume(&at_time(scene, time), self.outputs)?;
+                current.hash = self.hash(&volume, *depth)?;
+                current.volume = Some(progress.watch(volume));
             }
-            let Some(view) = &mut shown.1 else { continue };
             // The angle is relative to the scene's camera, independent of the previous frame.
-            let camera = scene.camera.turned(turn * f64::from(frame) / f64::from(*count));
-            view.set_camera(camera).map_err(|error| input.failure(RenderError::from(error)))?;
+            let angle = turn * f64::from(frame) / f64::from(*count);
+            let shown = current.shown(angle);
+            if is_kept(frame, shown) {
+                progress.step();
+                continue;
+            }
+            let headless = match &mut headless {
+                Some(headless) => headless,
+                none => none.insert(input.headless(false, [scene])?),
+            };
+            if let Some(volume) = current.volume.take() {
+                current.view = Some(headless.view(volume, scene).map_err(|error| input.failure(error))?);
+            }
+            let Some(view) = &mut current.view else { continue };
+            view.set_camera(scene.camera.turned(angle)).map_err(|error| input.failure(RenderError::from(error)))?;
             let mut rendering = headless.draw(view).map_err(|error| input.failure(error))?;
-            overlay.draw(&mut rendering.image);
-            take(frame, &rendering.image)?;
+            self.overlay.draw(&mut rendering.image);
+            take(frame, shown, &rendering.image)?;
             log_frame(&format!("frame {frame}"), &rendering.stats);
             progress.step();
         }
         match save_scene {
-            Some(path) => outputs::write(&[(path, scene_file(&scene, path)?)], &[]),
+            Some(path) => outputs::write(&[(path, scene_file(scene, path)?)], &[]),
             None => Ok(()),
         }
+    }
+}
+
+/// The time that is in memory.
+#[derive(Default)]
+struct Current {
+    time: Option<u32>,
+    /// Before a frame of it is drawn.
+    volume: Option<OpenVolume>,
+    /// From then on.
+    view: Option<HeadlessView>,
+    hash: blake3::Hasher,
+}
+
+impl Current {
+    /// The hash of what a frame shows, turned by some degrees.
+    fn shown(&self, angle: f64) -> blake3::Hash {
+        self.hash.clone().update(&angle.to_le_bytes()).finalize()
     }
 }
 

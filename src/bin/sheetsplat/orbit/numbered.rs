@@ -36,6 +36,12 @@ impl Pattern {
         Some(Self { folder: path.with_file_name(""), before: before.to_owned(), digits, after: after.to_owned() })
     }
 
+    /// The name of the list of all frames that were made.
+    pub(super) fn list(&self) -> PathBuf {
+        let Self { folder, before, after, .. } = self;
+        folder.join(format!("{before}#{after}.made"))
+    }
+
     /// The file name of a frame.
     pub(super) fn path(&self, frame: u32) -> PathBuf {
         let Self { folder, before, after, .. } = self;

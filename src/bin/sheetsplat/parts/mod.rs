@@ -9,6 +9,7 @@ use std::path::Path;
 use sheetsplat::Stats;
 use sheetsplat::scene::{OpenVolume, Scene};
 use sheetsplat::settings::{Region, Window};
+use sheetsplat::volume::ReadOptions;
 
 use crate::arguments::Input;
 use crate::failure::Failure;
@@ -16,7 +17,7 @@ use crate::failure::Failure;
 /// The part of an image that is drawn.
 #[derive(clap::Args)]
 pub(crate) struct Part {
-    /// Draw only slabs A to B - 1, into a part of the image for `sheetsplat merge`. An existing part is not drawn again.
+    /// Draw only slabs A to B - 1, into a part of the image for `sheetsplat merge`. A part that exists and shows the same is not drawn again.
     #[arg(long, value_name = "A..B", allow_hyphen_values = true, value_parser = parse_slabs)]
     slabs: Option<Range<i32>>,
     /// Draw only these pixels of the whole image, into a part for `sheetsplat merge`.
@@ -38,9 +39,26 @@ impl Part {
         !self.is_stated() && !self.overwrite
     }
 
-    /// Whether a part exists and is to be kept.
-    pub(crate) fn is_done(&self, output: &Path) -> bool {
-        self.is_stated() && !self.overwrite && output.exists()
+    /// Whether a part exists and is to be kept: one that is whole, and that shows the same. Any other is drawn again.
+    pub(crate) fn is_done(
+        &self,
+        output: &Path,
+        input: &Input,
+        (volume, scene): (&OpenVolume, &Scene),
+        window: &Window,
+    ) -> Result<bool, Failure> {
+        if self.overwrite || !output.exists() {
+            return Ok(false);
+        }
+        let mut options = ReadOptions::default();
+        options.memory = input.options().memory;
+        let reason = match sheetsplat::Part::open_with(output, &options) {
+            Ok(part) if part.shows(volume, scene, window)? => return Ok(true),
+            Ok(_) => "it is part of another image".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        log::info!("{}: drawn again: {reason}", output.display());
+        Ok(false)
     }
 
     /// Checks the options beside a part, and the name of its file.
