@@ -195,16 +195,15 @@ fn check_content(part: &Part) -> Result<(), MergeError> {
 }
 
 /// Checks that regions fill an image, and that those of parts that show something share no pixels.
-fn check_regions(regions: &BTreeMap<Region, Vec<Part>>, identity: &Identity) -> Result<(), MergeError> {
+fn check_regions<'a>(regions: &'a BTreeMap<Region, Vec<Part>>, identity: &Identity) -> Result<(), MergeError> {
     let [width, height] = identity.size;
     let all: Vec<&Region> = regions.keys().collect();
-    let shown: Vec<(&Region, Vec<(&Part, Range<i32>)>)> = (regions.iter())
-        .map(|(region, parts)| {
-            let within = parts.iter().map(|part| (part, part.window.within(&identity.slabs)));
-            (region, within.filter(|(_, slabs)| !slabs.is_empty()).collect())
-        })
-        .filter(|(_, parts): &(_, Vec<_>)| !parts.is_empty())
-        .collect();
+    let shown_parts = |(region, parts): (&'a Region, &'a Vec<Part>)| {
+        let within = parts.iter().map(|part| (part, part.window.within(&identity.slabs)));
+        let shown: Vec<_> = within.filter(|(_, slabs)| !slabs.is_empty()).collect();
+        (!shown.is_empty()).then_some((region, shown))
+    };
+    let shown: Vec<_> = regions.iter().filter_map(shown_parts).collect();
     for (at, (region, parts)) in shown.iter().enumerate() {
         if let Some((other, others)) = shown[..at].iter().find(|(other, _)| other.overlaps(region)) {
             return Err(sharing((region, parts), (other, others)));

@@ -131,7 +131,7 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
     }
     folder.run("sweep gone.toml -o s.png --set splatting.radius=1,2").assert_failure(2, &["gone.toml"]);
     let fails = |code: i32, arguments: &str, words: &[&str]| {
-        folder.run(&format!("sweep {WIDE} {arguments}")).assert_failure(code, words)
+        folder.run(&format!("sweep {WIDE} {arguments}")).assert_failure(code, words);
     };
     fails(1, "-o s.png --set splatting.radius=1,2 --adapter nonesuch", &["nonesuch", &adapter()]);
     fails(2, "-o no/s.png --set splatting.radius=1,2", &["no/s.png", "the folder no: No such file"]);
