@@ -1,7 +1,6 @@
 //! Work that nobody waits for any more, as after Ctrl-C in Python: drawing stops between two batches, and what it returns is discarded.
 
 use std::cell::RefCell;
-use std::panic::resume_unwind;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,8 +8,7 @@ thread_local! {
     static WATCHED: RefCell<Option<Arc<AtomicBool>>> = const { RefCell::new(None) };
 }
 
-/// Does some work, which may stop early once the flag is set. Then its result is to be discarded, or it unwinds without a message; nothing that outlives
-/// the result is incomplete.
+/// Does some work, which may stop early once the flag is set. Then its result is to be discarded; nothing that outlives the result is incomplete.
 pub fn watch<T>(abandoned: &Arc<AtomicBool>, work: impl FnOnce() -> T) -> T {
     let before = WATCHED.replace(Some(Arc::clone(abandoned)));
     let result = work();
@@ -31,12 +29,5 @@ impl Abandoned {
     /// Whether nobody waits for it.
     pub(crate) fn is_true(&self) -> bool {
         self.0.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
-    }
-
-    /// Unwinds to whoever watches if nobody waits for it.
-    pub(crate) fn check(&self) {
-        if self.is_true() {
-            resume_unwind(Box::new("nobody waits for this work"));
-        }
     }
 }

@@ -102,6 +102,7 @@
 //! that take part · *label* the number of the segment that a voxel of a segmented volume belongs to
 //! ([`Volume::labels`]) · *brick* 4×4×4 neighbouring voxels · *tile* a square of 32×32 pixels.
 
+#[cfg_attr(not(feature = "cpu"), expect(dead_code, reason = "only the native backend stops early"))]
 mod abandon;
 mod after;
 pub mod appearance;

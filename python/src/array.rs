@@ -5,7 +5,7 @@ use std::fmt::Display;
 use std::marker::PhantomData;
 use std::sync::Arc;
 
-use numpy::ndarray::{ArrayView3, Axis};
+use numpy::ndarray::ArrayView3;
 use numpy::{Element, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
@@ -252,7 +252,7 @@ fn fill_typed<V: Voxels>(array: &Bound<'_, PyAny>, voxels: &mut [V::Voxel], firs
     macro_rules! fill {
         ($($type:ty),*) => {
             $(if let Some(array) = typed::<$type>(array) {
-                return fill_from::<$type, V>(array.py(), array.as_array(), voxels, first).map(|()| true);
+                return fill_from::<$type, V>(array.as_array(), voxels, first).map(|()| true);
             })*
         };
     }
@@ -260,29 +260,20 @@ fn fill_typed<V: Voxels>(array: &Bound<'_, PyAny>, voxels: &mut [V::Voxel], firs
     Ok(false)
 }
 
-/// Fills memory with samples, some planes at a time, between which Ctrl-C ends it.
 fn fill_from<T: Sample, V: Voxels>(
-    py: Python<'_>,
     samples: ArrayView3<'_, T>,
     voxels: &mut [V::Voxel],
     first: [usize; 3],
 ) -> Result<(), Raised> {
+    let is_refused = |(sample, voxel): (&T, &mut V::Voxel)| V::of(*sample).map(|of| *voxel = of).is_none();
+    let refused = match samples.as_slice() {
+        Some(samples) => samples.iter().zip(voxels).position(is_refused),
+        None => samples.iter().zip(voxels).position(is_refused),
+    };
+    let Some(at) = refused else { return Ok(()) };
     let (_, y, x) = samples.dim();
-    let planes = (BLOCK / (y * x)).max(1);
-    let of_planes = samples.axis_chunks_iter(Axis(0), planes).zip(voxels.chunks_mut(planes * y * x));
-    for (number, (samples, voxels)) in of_planes.enumerate() {
-        py.check_signals()?;
-        let is_refused = |(sample, voxel): (&T, &mut V::Voxel)| V::of(*sample).map(|of| *voxel = of).is_none();
-        let refused = match samples.as_slice() {
-            Some(samples) => samples.iter().zip(voxels).position(is_refused),
-            None => samples.iter().zip(voxels).position(is_refused),
-        };
-        let Some(at) = refused else { continue };
-        let place = [at / (y * x), at / x % y, at % x];
-        let [z, y, x]: [usize; 3] = std::array::from_fn(|axis| first[axis] + place[axis]);
-        let found = samples[place].to_string();
-        let name = format!("labels[{}, {y}, {x}]", z + number * planes);
-        return Err(error::volume(&name, &found, "whole numbers from 0 to 65535"));
-    }
-    Ok(())
+    let place = [at / (y * x), at / x % y, at % x];
+    let [z, y, x]: [usize; 3] = std::array::from_fn(|axis| first[axis] + place[axis]);
+    let found = samples[place].to_string();
+    Err(error::volume(&format!("labels[{z}, {y}, {x}]"), &found, "whole numbers from 0 to 65535"))
 }

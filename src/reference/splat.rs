@@ -3,7 +3,6 @@
 use glam::{DVec2, DVec4};
 
 use super::{Buffer, Geometry, Section, Splat};
-use crate::abandon::Abandoned;
 use crate::kernel::Kernel;
 use crate::parallel::prelude::*;
 
@@ -29,12 +28,10 @@ pub fn draw(sections: &[Section], kernel: &Kernel, buffer: &mut Buffer, blend: i
             (low.y as usize / ROWS..=high.y as usize / ROWS).for_each(|band| bands[band].push(index));
         }
     }
-    let abandoned = Abandoned::here();
     buffer.pixels.par_chunks_mut(width * ROWS).zip(&bands).enumerate().for_each(|(band, (pixels, indices))| {
         let first_row = band * ROWS;
         let last_row = first_row + pixels.len() / width - 1;
         for section in indices.iter().map(|&index| &sections[index as usize]) {
-            abandoned.check();
             let (low, high) = section.pixels(kernel.radius());
             let (low_x, high_x) = (low.x.max(0.0) as usize, high.x.min(last.x) as usize);
             let (low_y, high_y) = (first_row.max(low.y.max(0.0) as usize), last_row.min(high.y.min(last.y) as usize));

@@ -29,7 +29,6 @@ mod surface;
 use glam::UVec2;
 
 use super::{Areas, Buffer, Culled, Host, resolve};
-use crate::abandon::Abandoned;
 use crate::error::RenderError;
 use crate::image::channels::Joining;
 use crate::parallel::prelude::*;
@@ -80,12 +79,8 @@ fn composite(frames: &[Frame], region: &Region) -> Vec<Composited> {
 
 fn each_place_in<T: Send>(region: &Region, of: impl Fn(UVec2) -> T + Sync) -> Vec<T> {
     let Region { x, y, width, height } = *region;
-    let (pixels, abandoned) = ((0..width * height).into_par_iter(), Abandoned::here());
-    let of = |at| {
-        abandoned.check();
-        of(UVec2::new(x + at % width, y + at / width))
-    };
-    pixels.map(of).collect()
+    let pixels = (0..width * height).into_par_iter();
+    pixels.map(|at| of(UVec2::new(x + at % width, y + at / width))).collect()
 }
 
 /// The pixels of a window composited from all channels, row by row.
