@@ -133,9 +133,9 @@ fn tables_belong_to_means() {
     let message = reopened(&|part| part.identity.means[0].transfer.iso_ranges = Some(vec![[2.0, 1.0]]));
     assert!(message.unwrap_err().contains("mean.iso_ranges[0]"));
     // Tables that are too long for the description in an NPZ file are refused before anything is written; EXR holds them.
-    let long = (0..60_000).map(|at| (f64::from(at) / 7.0, 0.5)).collect();
+    let long = (0..60_000).map(|at| (f64::from(at) / 7.0, DVec3::splat(0.5))).collect();
     let mut part = part;
-    part.identity.means[0].transfer.opacity = Ramp::new(long).unwrap();
+    part.identity.means[0].transfer.color = Ramp::new(long).unwrap();
     let message = part.save(&folder.path().join("long.npz")).unwrap_err().to_string();
     assert!(message.contains("part.json: found ") && message.contains("or a file .exr"), "{message}");
     assert!(!folder.path().join("long.npz").exists());
