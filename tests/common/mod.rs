@@ -7,10 +7,12 @@ pub(crate) mod compare;
 pub(crate) mod devices;
 pub(crate) mod images;
 pub(crate) mod pool;
+pub(crate) mod random_scene;
 pub(crate) mod shared;
 pub(crate) mod store;
 #[cfg(feature = "gpu")]
 pub(crate) mod surfaces;
+pub(crate) mod tally;
 pub(crate) mod values;
 
 use glam::{DVec3, DVec4, UVec3};

@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::cells::Bits;
 use super::frame::Frame;
-use super::planes::{Plane, PlaneRow};
+use super::planes::Plane;
 use super::sheet::SlabSheet;
 use crate::cpu::count::bits;
 use crate::cpu::cull::OpenMask;
@@ -177,14 +177,12 @@ impl Frame<'_> {
         }
         plane.graded[row] |= missing << column;
         let Some(of) = &plane.points else { return };
-        let (PlaneRow { values, gradients }, weights) = (&mut plane.rows[row], &mut plane.weights);
+        let (gradients, weights) = (&mut plane.rows[row].gradients, &mut plane.weights);
         simd.vectorize(
             #[inline(always)]
             || {
                 let field = plane.held.as_ref().map_or(self.field, |held| self.field.of(held));
-                let mut numbers = [0.0; LANES];
-                numbers.copy_from_slice(&values[column..column + LANES]);
-                let new = field.gradients(simd, of, [column, row], missing, &numbers, weights);
+                let new = field.gradients(simd, of, [column, row], missing, weights);
                 for (gradients, new) in gradients.iter_mut().zip(new) {
                     bits(missing.into()).for_each(|lane| gradients[column + lane as usize] = new[lane as usize]);
                 }

@@ -7,6 +7,7 @@ mod chunks;
 mod levels;
 mod modes;
 mod picks;
+mod random;
 mod regions;
 mod same_bytes;
 mod scenes;

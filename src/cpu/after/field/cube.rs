@@ -230,22 +230,34 @@ impl Field<'_> {
         rows
     }
 
-    /// `Σ (c - f)·g·δ` of one of eight points, given f.
+    /// `Σ (c - f)·g·δ / N` of one of eight points, given `1 / N`, as [`Self::row_moments`] computes it.
     #[inline(always)]
-    pub(super) fn cube_moments<S: Simd>(&self, simd: S, weights: &Weights, lane: usize, number: f32) -> [f32; 3] {
+    pub(super) fn cube_moments<S: Simd>(&self, simd: S, weights: &Weights, lane: usize, per_weight: f32) -> [f32; 3] {
         let [step_y, step_z] = self.steps();
         let first = weights.cube(lane).index;
-        let [to_x, to_y] = offsets(simd, &weights.cubes, lane);
+        // The voxel nearest to the point.
+        let near = [0, 1, 2].map(|axis: usize| {
+            let rest: f32 = weights.cubes.rest[axis][lane];
+            (rest + 0.5).floor().clamp(0.0, SIDE as f32 - 1.0)
+        });
+        let [x, y, z] = near.map(|steps| steps as usize);
+        let nearest = self.coefficients.at(first + x + y * step_y + z * step_z);
+        let to = |axis: usize| f32x16::splat(simd, near[axis]) - f32x16::load_array(simd, OFFSETS[axis]);
+        let [to_x, to_y] = [to(0), to(1)];
         let zero = f32x16::splat(simd, 0.0);
-        let (mut x, mut y, mut z) = (zero, zero, zero);
+        let (mut moments, mut offsets, mut sum) = ([zero; 3], [zero; 3], zero);
         for plane in 0..SIDE {
-            let c = rows(simd, self.coefficients, first + plane * step_z, step_y) - self.base;
-            let weighted = weights.plane(simd, lane, plane) * (c * self.scale - number);
-            x += weighted * to_x;
-            y += weighted * to_y;
-            z += weighted * (weights.cubes.rest[2][lane] - plane as f32);
+            let c = rows(simd, self.coefficients, first + plane * step_z, step_y) - nearest;
+            let weight = weights.plane(simd, lane, plane);
+            let weighted = weight * (c * self.scale);
+            sum += weighted;
+            for (axis, to) in [to_x, to_y, f32x16::splat(simd, near[2] - plane as f32)].into_iter().enumerate() {
+                moments[axis] += weighted * to;
+                offsets[axis] += weight * to;
+            }
         }
-        [sum_of(x), sum_of(y), sum_of(z)]
+        let mean = sum_of(sum) * per_weight;
+        [0, 1, 2].map(|axis: usize| (sum_of(moments[axis]) - mean * sum_of(offsets[axis])) * per_weight)
     }
 
     /// Steps in memory along y and z.

@@ -62,8 +62,6 @@ pub(super) struct Field<'a> {
     per_spacing: [f32; 3],
     /// From `Σ (c - f)·g·δ / N` to the kernel's gradient.
     per_moment: [f32; 3],
-    /// Moments below this are rounding errors; squared.
-    min_moment: f32,
     /// Whether 4×4×4 voxels are all that a kernel reaches, and sums of values less `base` cannot overflow.
     is_cube: bool,
 }
@@ -104,7 +102,6 @@ impl<'a> Field<'a> {
             gradient_length,
             per_spacing: in_f32(1.0 / spacing),
             per_moment: in_f32(-2.0 * falloff / spacing),
-            min_moment: min_moment(radius, numbers.range).powi(2),
             is_cube: Self::is_narrow(radius) && is_moderate && extent.dims.min_element() as usize >= cube::SIDE,
         }
     }
@@ -186,7 +183,7 @@ impl<'a> Field<'a> {
         values
     }
 
-    /// ∇f in numbers per world unit, by component, at those of eight points of a plane that have a bit, given their f as numbers.
+    /// ∇f in numbers per world unit, by component, at those of eight points of a plane that have a bit.
     #[inline(always)]
     pub(super) fn gradients<S: Simd>(
         &self,
@@ -194,7 +191,6 @@ impl<'a> Field<'a> {
         of: &(Points, LowPass),
         [column, row]: [usize; 2],
         lanes: u32,
-        numbers: &[f32; LANES],
         weights: &mut Weights,
     ) -> [[f32; LANES]; 3] {
         let mut gradients = [[0.0; LANES]; 3];
@@ -204,7 +200,7 @@ impl<'a> Field<'a> {
         {
             gradients = match self.gradient {
                 Gradient::Differences => self.cubes_differences(simd, weights, lanes),
-                Gradient::Kernel => self.cubes_moments(simd, weights, lanes, numbers),
+                Gradient::Kernel => self.cubes_moments(simd, weights, lanes),
             };
             // Where the sum is not finite a hole is near.
             let [x, y, z] = gradients.each_ref().map(|component| f32x8::load_array_ref(simd, component));
@@ -216,7 +212,7 @@ impl<'a> Field<'a> {
             let (at, low_pass) = (of.0.of(column + lane, row), &of.1);
             let gradient = match self.gradient {
                 Gradient::Differences => self.row_differences(simd, at, low_pass),
-                Gradient::Kernel => self.kernel_gradient(self.row_moments(simd, at, low_pass, numbers[lane])),
+                Gradient::Kernel => self.kernel_gradient(self.row_moments(simd, at, low_pass)),
             };
             (0..3).for_each(|axis| gradients[axis][lane] = gradient[axis]);
         }
@@ -239,40 +235,23 @@ impl<'a> Field<'a> {
 
     /// The kernel's gradients of the points that have a bit.
     #[inline(always)]
-    fn cubes_moments<S: Simd>(
-        &self,
-        simd: S,
-        weights: &Weights,
-        lanes: u32,
-        numbers: &[f32; LANES],
-    ) -> [[f32; LANES]; 3] {
+    fn cubes_moments<S: Simd>(&self, simd: S, weights: &Weights, lanes: u32) -> [[f32; LANES]; 3] {
         let per_weight = (1.0 / weights.totals(simd)).to_array();
         let mut gradients = [[0.0; LANES]; 3];
         for lane in bits(lanes.into()) {
             let lane = lane as usize;
-            let moments = self.cube_moments(simd, weights, lane, numbers[lane]);
-            let gradient = self.kernel_gradient(moments.map(|moment| moment * per_weight[lane]));
+            let gradient = self.kernel_gradient(self.cube_moments(simd, weights, lane, per_weight[lane]));
             (0..3).for_each(|axis| gradients[axis][lane] = gradient[axis]);
         }
         gradients
     }
 
-    /// The kernel's gradient for `Σ (c - f)·g·δ / N`. Differences from f, because where all coefficients are equal it is then no more than the
-    /// rounding error of f.
+    /// The kernel's gradient for `Σ (c - f)·g·δ / N`.
     #[inline(always)]
     fn kernel_gradient(&self, [x, y, z]: [f32; 3]) -> [f32; 3] {
-        if x * x + y * y + z * z < self.min_moment {
-            return [0.0; 3];
-        }
         let [per_x, per_y, per_z] = self.per_moment;
         [x * per_x, y * per_y, z * per_z]
     }
-}
-
-/// The rounding error of `Σ (c - f)·g·δ / N`: some units in the last place of its largest terms. Where all values are equal the sum differs
-/// by no more, and a direction made of that would be noise.
-fn min_moment(radius: f64, range: [f32; 2]) -> f32 {
-    8.0 * f32::EPSILON * radius as f32 * range[0].abs().max(range[1].abs())
 }
 
 #[cfg(test)]
@@ -334,7 +313,7 @@ mod tests {
                     let mut weights = Weights::new();
                     let numbers = ours.values(simd, &of, [0, 0], 1 << lane, &mut weights);
                     let gradient = |field: &Field<'_>, weights: &mut Weights| {
-                        field.gradients(simd, &of, [0, 0], 1 << lane, &numbers, weights).map(|component| component[lane])
+                        field.gradients(simd, &of, [0, 0], 1 << lane, weights).map(|component| component[lane])
                     };
                     (numbers[lane], [gradient(&ours, &mut weights), gradient(&keeping, &mut Weights::new())])
                 });

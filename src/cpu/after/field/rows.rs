@@ -28,13 +28,6 @@ struct Row {
     step: [f32; 3],
 }
 
-/// Eight voxels of a row.
-struct Lanes<S: Simd> {
-    /// g; 0 outside the row.
-    weights: f32x8<S>,
-    offsets: [f32x8<S>; 3],
-}
-
 /// The weight and the sums of a point.
 struct Sums<S: Simd> {
     weights: f32x8<S>,
@@ -42,9 +35,9 @@ struct Sums<S: Simd> {
 }
 
 impl Row {
-    /// Eight voxels, from one on.
+    /// g of eight voxels, from one on; 0 outside the row.
     #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, field: &Field<'_>, from: usize) -> Lanes<S> {
+    fn lanes<S: Simd>(&self, simd: S, field: &Field<'_>, from: usize) -> f32x8<S> {
         let number = iota(simd) + from as f32;
         let offset = |axis: usize| number * self.step[axis] + self.offset[axis];
         let [x, y, z] = [offset(0), offset(1), offset(2)];
@@ -52,7 +45,7 @@ impl Row {
         let is_inside = squared.simd_lt(f32x8::splat(simd, field.radius_squared))
             & number.simd_lt(f32x8::splat(simd, self.count as f32));
         let gaussian = exp2(simd, (squared * field.exponent).max(f32x8::splat(simd, -126.0)));
-        Lanes { weights: is_inside.select(gaussian, f32x8::splat(simd, 0.0)), offsets: [x, y, z] }
+        is_inside.select(gaussian, f32x8::splat(simd, 0.0))
     }
 
     /// Where its eights begin.
@@ -78,7 +71,7 @@ impl Field<'_> {
                         let lanes = row.lanes(simd, self, from);
                         let c = load(simd, self.coefficients, row.index + from);
                         let is_present = c.simd_eq(c);
-                        let weight = is_present.select(lanes.weights, zero);
+                        let weight = is_present.select(lanes, zero);
                         weights += weight;
                         sum += weight * is_present.select((c - self.base) * self.scale, zero);
                     }
@@ -99,7 +92,7 @@ impl Field<'_> {
                 let (mut weights, mut sums) = (0.0, f32x4::splat(simd, 0.0));
                 for row in self.rows(at, low_pass) {
                     for from in row.eights() {
-                        let of_lanes = row.lanes(simd, self, from).weights.to_array();
+                        let of_lanes = row.lanes(simd, self, from).to_array();
                         let voxels = row.index + from..row.index + row.count;
                         for (index, weight) in voxels.zip(of_lanes) {
                             if weight > 0.0 && !self.coefficients.at(index).is_nan() {
@@ -114,25 +107,38 @@ impl Field<'_> {
         )
     }
 
-    /// `Σ (c - f)·g·δ / N`, with f as a number.
+    /// `Σ (c - f)·g·δ / N`, which does not change where δ is counted from another point, for `Σ (c - f)·g` is 0: here from the nearest voxel, and c
+    /// from that voxel's. So no term is much larger than the sum, however narrow the kernel, and where all c are equal the sum is 0.
     #[inline(never)]
-    pub(super) fn row_moments<S: Simd>(&self, simd: S, at: DVec3, low_pass: &LowPass, number: f32) -> [f32; 3] {
+    pub(super) fn row_moments<S: Simd>(&self, simd: S, at: DVec3, low_pass: &LowPass) -> [f32; 3] {
         simd.vectorize(
             #[inline(always)]
             || {
                 let zero = f32x8::splat(simd, 0.0);
-                let mut sums = Sums { weights: zero, sums: [zero; 3] };
+                let near = self.nearest_voxel(at);
+                let nearest = self.coefficients.at(self.extent.index(near));
+                let (mut weights, mut sum, mut moments, mut offsets) = (zero, zero, [zero; 3], [zero; 3]);
                 for row in self.rows(at, low_pass) {
+                    let to_first = low_pass.lowered * (near.as_dvec3() - row.first.as_dvec3());
+                    let to_first = to_first.to_array().map(|component| component as f32);
                     for from in row.eights() {
-                        let lanes = row.lanes(simd, self, from);
                         let c = load(simd, self.coefficients, row.index + from);
                         let is_present = c.simd_eq(c);
-                        let weight = is_present.select(lanes.weights, zero);
-                        let number = is_present.select((c - self.base) * self.scale - number, zero);
-                        sums.add(weight, [weight * number; 3], lanes.offsets);
+                        let weight = is_present.select(row.lanes(simd, self, from), zero);
+                        let weighted = weight * is_present.select((c - nearest) * self.scale, zero);
+                        let number = iota(simd) + from as f32;
+                        weights += weight;
+                        sum += weighted;
+                        for axis in 0..3 {
+                            let offset = number * row.step[axis] + to_first[axis];
+                            moments[axis] += weighted * offset;
+                            offsets[axis] += weight * offset;
+                        }
                     }
                 }
-                sums.means()
+                let per_weight = 1.0 / sum_of(weights);
+                let mean = sum_of(sum) * per_weight;
+                [0, 1, 2].map(|axis: usize| (sum_of(moments[axis]) - mean * sum_of(offsets[axis])) * per_weight)
             },
         )
     }
@@ -149,9 +155,9 @@ impl Field<'_> {
                     for from in row.eights() {
                         let lanes = row.lanes(simd, self, from);
                         let c = load(simd, self.coefficients, row.index + from);
-                        let weight = c.simd_eq(c).select(lanes.weights, zero);
+                        let weight = c.simd_eq(c).select(lanes, zero);
                         let differences = self.differences(simd, &row, from, weight);
-                        sums.add(weight, [weight; 3], differences);
+                        sums.add(weight, differences);
                     }
                 }
                 let [x, y, z] = sums.means();
@@ -224,20 +230,25 @@ impl Field<'_> {
         })
     }
 
-    /// The index of the voxel nearest to a point.
-    fn nearest(&self, at: DVec3) -> usize {
+    /// The voxel nearest to a point.
+    fn nearest_voxel(&self, at: DVec3) -> UVec3 {
         let last = self.extent.dims.as_dvec3() - 1.0;
         // Cast, which rounds towards 0.
-        self.extent.index((at + 0.5).clamp(DVec3::ZERO, last).as_uvec3())
+        (at + 0.5).clamp(DVec3::ZERO, last).as_uvec3()
+    }
+
+    /// Its index.
+    fn nearest(&self, at: DVec3) -> usize {
+        self.extent.index(self.nearest_voxel(at))
     }
 }
 
 impl<S: Simd> Sums<S> {
     #[inline(always)]
-    fn add(&mut self, weights: f32x8<S>, factors: [f32x8<S>; 3], numbers: [f32x8<S>; 3]) {
+    fn add(&mut self, weights: f32x8<S>, numbers: [f32x8<S>; 3]) {
         self.weights += weights;
-        for ((sum, factor), number) in self.sums.iter_mut().zip(factors).zip(numbers) {
-            *sum += factor * number;
+        for (sum, number) in self.sums.iter_mut().zip(numbers) {
+            *sum += weights * number;
         }
     }
 
