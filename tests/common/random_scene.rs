@@ -212,7 +212,7 @@ fn scene(style: u64, random: &mut Random, volume: &Volume, mut splatting: Splatt
     let extent = 2.0 * grid.bounding_radius(splatting.radius) / grid.unit();
     splatting.slab_width = splatting.slab_width.max(extent / MOST_SLABS).min(8.0);
     let background = if one_in(random, 2) { [0.0, 0.0, 0.0, 1.0] } else { [(); 4].map(|()| random.uniform(0.0, 1.0)) };
-    let image = ImageSettings { width: size[0], height: size[1], background, ..ImageSettings::default() };
+    let image = ImageSettings { width: size[0], height: size[1], background };
     let every = Method::CompositeEverySample;
     let direction = random.direction() * logarithmic(random, 0.001, 1000.0);
     let shading = Shading {

@@ -200,24 +200,6 @@ fn settings_one_by_one_against_the_twin() {
 }
 
 #[test]
-fn random_scenes_against_the_twin() {
-    let mut random = Random(18);
-    let mut shows = 0;
-    let mut worst = f64::INFINITY;
-    for case in 0..80 {
-        let (volume, mut scene) = random_case(&mut random);
-        scene.splatting.culling = false;
-        let expected = twin(&volume, &scene);
-        shows += usize::from(shown(&expected) > 0.1);
-        let psnr = psnr(&draw(&volume, &scene).image, &expected);
-        assert!(psnr > 80.0, "case {case}: {psnr} dB with {scene:?}");
-        worst = worst.min(psnr);
-    }
-    println!("worst: {worst:.1} dB");
-    assert!(shows > 40, "only {shows} cases show anything");
-}
-
-#[test]
 fn holes_and_labels_against_the_twin() {
     let (volume, mut scene) = head();
     let mut values = volume.values().to_vec();
