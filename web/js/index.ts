@@ -16,7 +16,7 @@ export type Source = File | Blob | ArrayBuffer | URL | string | Given;
 
 /** How a view is made. */
 export interface Options {
-    /** `"auto"` by default: WebGPU where it works, else the CPU. */
+    /** `"auto"` by default: WebGPU where it works, is no software, and draws its first frame within two seconds, else the CPU. */
     backend?: Backend;
     /** The number of workers that share a frame on the CPU: by default as many as there are cores, at most 8. Each holds the volume. */
     workers?: number;

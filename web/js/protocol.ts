@@ -1,6 +1,6 @@
 // What the page and its workers tell one another: calls by name, each answered once.
 
-/** What draws: `"gpu"` is the browser's WebGPU, `"cpu"` its processor, `"auto"` the first that works. */
+/** What draws: `"gpu"` is the browser's WebGPU, `"cpu"` its processor, `"auto"` the faster one of those that work. */
 export type Backend = "auto" | "cpu" | "gpu";
 
 /** Counts and times of a frame; the names are those of `sheetsplat render --stats`. */

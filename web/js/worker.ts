@@ -10,6 +10,8 @@ import { Remote, type Answer, type Call, type Calls, type Given, type Pose, type
 const MAX_REOPENED = 3;
 /** Milliseconds within which the loss of a device is told after a call failed by it. */
 const LOSS_DELAY = 100;
+/** Milliseconds that the GPU's first frame may take if the backend is "auto": the CPU needs fewer for most pictures. */
+const SLOW_FRAME = 2000;
 
 /** A worker's global scope, of which TypeScript's library for pages knows nothing. */
 interface Scope {
@@ -19,9 +21,9 @@ interface Scope {
     sheetsplatLost?: (message: string) => void;
 }
 
-/** What is needed of the browser's WebGPU here. */
+/** What is needed of the browser's WebGPU here. Older browsers have `isFallbackAdapter` in the adapter itself. */
 interface GpuAccess {
-    requestAdapter(): Promise<object | null>;
+    requestAdapter(): Promise<{ info?: { isFallbackAdapter?: boolean }; isFallbackAdapter?: boolean } | null>;
 }
 
 const scope = self as unknown as Scope;
@@ -43,6 +45,8 @@ let isLost = false;
 let losses = 0;
 /** How many devices have been opened in place of lost ones since the last frame. */
 let reopened = 0;
+/** Whether the first frame has told how fast the GPU is. */
+let isJudged = false;
 /** Gets the canvas on which the CPU draws in the lost GPU's place. */
 let takeCanvas: ((canvas: OffscreenCanvas) => void) | undefined;
 
@@ -54,7 +58,10 @@ const calls: { [K in Exclude<keyof Calls, "giveCanvas">]: (...args: Parameters<C
             try {
                 // A canvas that has a context for WebGPU cannot get one for the CPU's pictures, so nothing touches it before a device is open.
                 // Without an adapter there is no need to load the library for it.
-                if (!await (navigator as { gpu?: GpuAccess }).gpu?.requestAdapter()) throw new Error("the browser offers no WebGPU adapter");
+                const adapter = await (navigator as { gpu?: GpuAccess }).gpu?.requestAdapter();
+                if (!adapter) throw new Error("the browser offers no WebGPU adapter");
+                const isSoftware = adapter.info?.isFallbackAdapter ?? adapter.isFallbackAdapter;
+                if (isSoftware && options.backend === "auto") throw new Error("the browser's WebGPU adapter is software");
                 gpu = await import("./gpu.js");
                 await gpu.default({ module_or_path: wasm("gpu") });
                 session = await gpu.Session.open(options.allAround, options.canvas);
@@ -228,9 +235,14 @@ async function draw(coarse: number): Promise<Stats> {
     const canvas = start.canvas!;
     if (gpu) {
         if (canvas.width !== width || canvas.height !== height) [canvas.width, canvas.height] = [width, height];
+        const began = performance.now();
         const stats = await (session as Gpu.Session).present() as Stats;
         reopened = 0;
-        return { ...stats, workers: 1 };
+        const isSlow = !isJudged && start.backend === "auto" && performance.now() - began > SLOW_FRAME;
+        isJudged = true;
+        if (!isSlow) return { ...stats, workers: 1 };
+        await fallBack();
+        return await draw(coarse);
     }
     const began = performance.now();
     const parts = shares.of(width, height);

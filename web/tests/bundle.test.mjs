@@ -8,6 +8,7 @@ import { after, before, test } from "node:test";
 import { fileURLToPath } from "node:url";
 import { build, createServer } from "vite";
 import { open, page } from "./browser.mjs";
+import { HARDWARE } from "./helpers.mjs";
 import { serve } from "./serve.mjs";
 
 const web = dirname(dirname(fileURLToPath(import.meta.url)));
@@ -41,7 +42,7 @@ after(async () => {
 
 /** Opens the application, and checks that it draws by the GPU, and with another worker on the CPU. */
 async function draws(address) {
-    for (const [inWorkers, backend] of [[undefined, "gpu"], ["Object.defineProperty(navigator, 'gpu', { value: undefined });", "cpu"]]) {
+    for (const [inWorkers, backend] of [[HARDWARE, "gpu"], ["Object.defineProperty(navigator, 'gpu', { value: undefined });", "cpu"]]) {
         const { page: shown, faults } = await page(opened.browser, address, { inWorkers });
         await shown.waitForFunction(() => window.made, undefined, { timeout: 20_000 }).catch((error) => {
             throw new Error(`${error.message}\n${faults.join("\n")}`);

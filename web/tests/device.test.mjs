@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
 import { decode } from "fast-png";
 import { open } from "./browser.mjs";
-import { TINY, api, camera, colors, demo, picture } from "./helpers.mjs";
+import { HARDWARE, TINY, api, camera, colors, demo, picture } from "./helpers.mjs";
 
 let opened;
 before(async () => (opened = await open()));
@@ -35,7 +35,7 @@ async function made(shown, backend) {
 }
 
 test("auto draws by WebGPU where a device opens, else on the CPU", async () => {
-    const { page: shown } = await api(opened);
+    const { page: shown } = await api(opened, { inWorkers: HARDWARE });
     const found = await made(shown, "auto");
     assert.deepEqual([found.backend, found.drew], ["gpu", "gpu"]);
     assert.ok(found.colors > 10);
@@ -44,11 +44,24 @@ test("auto draws by WebGPU where a device opens, else on the CPU", async () => {
         "GPU.prototype.requestAdapter = async () => null;",
         failing("() => true"),
     ]) {
-        const { page: shown } = await api(opened, { inWorkers });
+        const { page: shown } = await api(opened, { inWorkers: HARDWARE + inWorkers });
         const found = await made(shown, "auto");
         assert.deepEqual([found.backend, found.drew], ["cpu", "cpu"], `${inWorkers}: ${JSON.stringify(found)}`);
         assert.ok(found.colors > 10, inWorkers);
         assert.match(await made(shown, "gpu"), /^backend: found "gpu", allowed: "cpu" in this browser: /);
+    }
+});
+
+test("auto leaves software adapters, and GPUs whose first frame is slow, to the CPU", async () => {
+    const late = HARDWARE.replace("now() / 1000", "now() * 1000");
+    for (const options of [{}, { inWorkers: late }]) {
+        const { page: shown } = await api(opened, options);
+        const found = await made(shown, "auto");
+        assert.deepEqual([found.backend, found.drew], ["cpu", "cpu"], JSON.stringify([found, options]));
+        assert.ok(found.colors > 10);
+        // Who names the GPU gets it.
+        const named = await made(shown, "gpu");
+        assert.deepEqual([named.backend, named.drew], ["gpu", "gpu"]);
     }
 });
 
@@ -101,7 +114,7 @@ test("another device takes the place of a lost one, with the camera and its home
 });
 
 test("where no other device opens, auto goes on drawing on the CPU", async () => {
-    const { page: shown } = await demo(opened, "backend=auto&workers=2&example=head:16", { ...TINY, inWorkers: failing("(count) => count > 1") });
+    const { page: shown } = await demo(opened, "backend=auto&workers=2&example=head:16", { ...TINY, inWorkers: HARDWARE + failing("(count) => count > 1") });
     // Backends find voxels hidden at different sheets, which may change a picture by one minus the opacity threshold.
     await shown.evaluate(async () => window.view.setScene(await window.view.scene(), { set: { "splatting.culling": false }, keepCamera: true }));
     const home = await shown.evaluate(() => window.view.scene());

@@ -4,6 +4,13 @@ import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { page } from "./browser.mjs";
 
+/** Workers that take the software adapter of this browser for hardware, however long it takes. */
+export const HARDWARE = `{
+    Object.defineProperty(GPUAdapterInfo.prototype, "isFallbackAdapter", { get: () => false });
+    const now = performance.now.bind(performance);
+    performance.now = () => now() / 1000;
+}`;
+
 const here = dirname(fileURLToPath(import.meta.url));
 export const fixtures = join(here, "..", "..", "tests", "fixtures");
 /** Pictures to look at, which continuous integration keeps. */
