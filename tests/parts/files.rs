@@ -218,7 +218,7 @@ fn damaged_files_are_errors() {
         open(&changed).unwrap_err().to_string()
     };
     let file = path.display();
-    assert_eq!(json("\"version\":1", "\"version\":9"), format!("{file}: part.version: found 9, allowed: 1"));
+    assert_eq!(json("\"version\":2", "\"version\":9"), format!("{file}: part.version: found 9, allowed: 2"));
     assert!(json("\"size\":[37,35]", "\"size\":[99999]").contains("part: found"));
     assert!(json("\"size\":[37,35]", "\"size\":[0,353]").contains("part.size: found 0×353"));
     assert!(json("front-to-back", "front-to-bach").contains("part.order: found \"front-to-bach\""));

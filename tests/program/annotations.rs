@@ -32,7 +32,8 @@ fn bar(image: &RgbaImage) -> usize {
     lengths.into_iter().next().unwrap()
 }
 
-const CUBE: &str = "builtin:cube --set image.width=320 --set image.height=200 --annotate scale";
+const CUBE: &str =
+    "builtin:cube --set camera.direction=[0,1,0] --set image.width=320 --set image.height=200 --annotate scale";
 
 #[test]
 fn a_scale_bar_is_as_long_as_it_says() {

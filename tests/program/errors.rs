@@ -160,7 +160,7 @@ fn values_beyond_any_renderer_are_2() {
         };
         render("--set camera.height=1e-300", &["camera.height", "1e-300", "5.12e-23"]);
         render("--set camera.height=1e300", &["camera.height", "1e300", "5.12e27"]);
-        let deep = "--set volume.spacing=[1,1e4,1] --set splatting.slab_width=0.05";
+        let deep = "--set camera.direction=[0,1,0] --set volume.spacing=[1,1e4,1] --set splatting.slab_width=0.05";
         render(deep, &["splatting.slab_width", "0.05", "65536 slabs"]);
         let perspective =
             |sets: &str, words: &[&str]| render(&format!("--set camera.projection=perspective {sets}"), words);

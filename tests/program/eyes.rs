@@ -7,7 +7,7 @@ use crate::*;
 /// What `info` says of a file's camera: its direction and up, and the line of text that says why.
 fn eye(folder: &Folder, arguments: &str) -> ([[f64; 3]; 2], String) {
     let json = folder.run(&format!("info {arguments} --json"));
-    json.assert_success();
+    assert_eq!(json.code, Some(0), "{}", json.stderr);
     let json: Value = serde_json::from_str(&json.stdout).unwrap();
     let vector = |key: &str| [0, 1, 2].map(|at| json["frame"][key][at].as_f64().unwrap());
     let text = folder.run(&format!("info {arguments}")).stdout;

@@ -16,7 +16,7 @@ fn lit(folder: &Folder, arguments: &str) -> [usize; 4] {
 #[test]
 fn without_a_scene_file_the_object_fills_the_image() {
     let folder = Folder::new();
-    let size = "--set image={width=100,height=80}";
+    let size = "--set image={width=100,height=80} --set camera.direction=[0,1,0]";
     for set in [
         "--set image.background=[0,0,0,1]",
         "--set camera.projection=perspective",

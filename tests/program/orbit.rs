@@ -220,7 +220,7 @@ fn bad_usage_and_input_are_2_and_leave_nothing() {
 #[test]
 fn a_saved_scene_renders_the_frames_bytes() {
     let folder = Folder::new();
-    let small = "--set image={width=60,height=40}";
+    let small = "--set image={width=60,height=40} --set camera.direction=[0,1,0]";
     for sets in ["--preset ct-skin", "--set camera.projection=perspective", WHOLE] {
         folder
             .run(&format!("orbit builtin:head:32 {small} {sets} -o f%d.png --count 4 --overwrite --save-scene s.toml"))
@@ -259,7 +259,7 @@ const TIMES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/channel
 #[test]
 fn times_and_turns_go_together() {
     let folder = Folder::new();
-    let look = "--set image={width=24,height=20} --set transfer={opacity=[[0,0],[25000,0.9]],color=[[0,[0,0,1]],[20000,[1,1,0]]]}";
+    let look = "--set image={width=24,height=20} --set camera.direction=[0,1,0] --set transfer={opacity=[[0,0],[25000,0.9]],color=[[0,[0,0,1]],[20000,[1,1,0]]]}";
     folder.orbit(&format!("{TIMES} {look} --time 0..3 --turn 90 --count 6 -o all-%d.png --save-scene turn.toml"));
     let scene = String::from_utf8(folder.read("turn.toml")).unwrap();
     assert!(scene.contains("time = 0"), "{scene}");

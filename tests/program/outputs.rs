@@ -155,7 +155,7 @@ fn the_reference_backend_agrees_with_the_others() {
         "--set splatting.method=axis-aligned --set volume.spacing=[1,1,3]",
         "--set splatting.method=axis-aligned --set camera.projection=perspective --set splatting.order=back-to-front",
     ] {
-        let (.., reference) = folder.pixels(&format!("{SMALL} {sets} --backend reference"));
+        let (.., reference) = folder.pixels(&format!("{SMALL} {sets} {UNCULLED} --backend reference"));
         for drawing in DRAWINGS {
             let (.., drawn) = folder.pixels(&format!("{SMALL} {sets} {UNCULLED} {drawing}"));
             let decibels = psnr(&drawn, &reference, BLACK, 50);

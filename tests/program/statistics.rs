@@ -56,7 +56,9 @@ fn stats_of_a_single_voxel() {
 
 fn assert_stats_of_a_single_voxel(folder: &Folder, rasterizer: &str, name: &str, least_bytes: u64) {
     folder.write_nrrd("one.nrrd", [1, 1, 1], [1.0, 1.0, 1.0], &[1.0]);
-    let haze = format!("--set transfer.opacity=[[0,0.5]] --set image.width=40 --set image.height=70 {rasterizer}");
+    let haze = format!(
+        "--set camera.direction=[0,1,0] --set transfer.opacity=[[0,0.5]] --set image.width=40 --set image.height=70 {rasterizer}"
+    );
     // The voxel lies on plane 0: two slabs are before it, two behind.
     let stats = folder.stats(&format!("one.nrrd {haze}"));
     assert_eq!(keys(&stats), STATS_KEYS);

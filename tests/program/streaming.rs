@@ -328,7 +328,7 @@ fn memory_stays_within_the_limit() {
     };
     folder.write("ball.raw", (0..side.pow(3)).flat_map(|index| value(index).to_le_bytes()).collect::<Vec<u8>>());
     let ball = "ball.raw --dims 256,256,256 --type float32 --endian little";
-    let set = "--backend cpu --set image={width=96,height=96} --set camera.fit=volume --set transfer.opacity=[[60,0],[80,1]] \
+    let set = "--backend cpu --set image={width=96,height=96} --set camera.direction=[0,1,0] --set camera.fit=volume --set transfer.opacity=[[60,0],[80,1]] \
                --set transfer.color=[[0,[1,1,1]]]";
     let two = [("RAYON_NUM_THREADS", "2"), ("MALLOC_TRIM_THRESHOLD_", "65536")];
     let peak = |what: &str| {

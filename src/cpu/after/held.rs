@@ -156,9 +156,9 @@ impl Frame<'_> {
             }
         }
         let dims = self.grid.dims;
-        // The nearest cubes inside the volume.
-        let most = (dims.as_dvec3() - 4.0).max(DVec3::ZERO);
-        let least = dims.as_dvec3().min(DVec3::splat(4.0));
+        // The nearest cubes inside the volume, and their neighbours for differences.
+        let most = (dims.as_dvec3() - 5.0).max(DVec3::ZERO);
+        let least = dims.as_dvec3().min(DVec3::splat(5.0));
         let low = (low.floor() - half_box.ceil() - RIM).clamp(DVec3::ZERO, most);
         let end = (high.floor() + half_box.ceil() + RIM + 1.0).clamp(least, dims.as_dvec3());
         let low = low.as_uvec3();
