@@ -214,28 +214,6 @@ fn first_hits_are_the_twins() {
     }
 }
 
-/// Near a voxel the field of a narrow kernel is almost constant; its gradient is short, and has a direction.
-#[test]
-fn gradients_of_narrow_kernels_are_the_twins() {
-    let (_, mut scene) = after();
-    let mut random = Random(552);
-    let values = (0..7 * 5 * 3).map(|_| random.uniform(3.0, 4.0) as f32).collect();
-    let volume = Volume::new("noise", glam::UVec3::new(7, 5, 3), DVec3::new(1.0, 1.0, 1.5), values).unwrap();
-    scene.transfer.color = Some(Ramp::new(vec![(3.0, DVec3::new(0.9, 0.3, 0.4)), (4.0, DVec3::ONE)]).unwrap());
-    scene.transfer.opacity = Some(Ramp::new(vec![(3.0, 0.9)]).unwrap());
-    scene.shading.gradient = Gradient::Kernel;
-    (scene.splatting.falloff, scene.splatting.slab_width) = (11.0, 0.1);
-    scene.camera = camera([0.4, 0.9, -0.3], 6.0);
-    for (compositing, radius) in [Compositing::Linear, Compositing::Maximum].map(|of| [(of, 2.0), (of, 3.0)]).concat() {
-        (scene.splatting.compositing, scene.splatting.radius) = (compositing, radius);
-        let expected = twin(&volume, &scene);
-        assert!(shown(&expected) > 0.2, "{compositing:?} shows nothing");
-        let psnr = psnr(&draw(&volume, &scene).image, &expected);
-        println!("{compositing:?}, radius {radius}: {psnr:.1} dB");
-        assert!(psnr > required(&scene), "{compositing:?}, radius {radius}: {psnr} dB");
-    }
-}
-
 fn segmented(volume: &Volume) -> Volume {
     let of_voxel = |index: u32| (volume.grid().voxel_at(index).element_sum() % 5 / 2) as u16;
     let labels = Labels {
