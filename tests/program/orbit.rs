@@ -291,5 +291,5 @@ fn times_and_turns_go_together() {
         run.assert_failure(2, &[expected]);
     }
     let run = folder.run(&format!("render {TIMES} {look} --time 0..2 -o no.png"));
-    run.assert_failure(2, &["volume.time: found \"0..2\""]);
+    run.assert_failure(2, &["--time: found \"0..2\""]);
 }

@@ -242,7 +242,9 @@ impl Input {
     fn by_flag(&self, error: &SceneError) -> Failure {
         let message = error.to_string();
         let SceneError::Invalid { origin, key, .. } = error else { return Failure::Input(message) };
-        let is_of = |set: &str| key.strip_prefix(set).is_some_and(|rest| rest.is_empty() || rest.starts_with('['));
+        // With several channels the keys of a volume are the first one's.
+        let own = key.strip_prefix("channel[0].").unwrap_or(key);
+        let is_of = |set: &str| own.strip_prefix(set).is_some_and(|rest| rest.is_empty() || rest.starts_with('['));
         let is_set = self.sets.iter().filter_map(|set| set.split_once('=')).any(|(set, _)| is_of(set.trim()));
         match FLAGS.iter().find(|(_, set)| is_of(set)).filter(|_| origin == "--set" && !is_set) {
             Some((flag, _)) => Failure::Input(message.replacen(&format!("--set: {key}"), flag, 1)),
