@@ -176,7 +176,7 @@ fn shared_quarter_head_agrees_with_the_reference() {
     let folder = Folder::new();
     for view in ["projection=perspective", "projection=orthographic"] {
         let render = format!("{} --set camera.{view} --set image.width=96 --set image.height=96", scene.display());
-        let (.., reference) = folder.pixels(&format!("{render} --backend reference"));
+        let (.., reference) = folder.pixels(&format!("{render} {UNCULLED} --backend reference"));
         for drawing in DRAWINGS {
             let (.., drawn) = folder.pixels(&format!("{render} {UNCULLED} {drawing}"));
             let decibels = psnr(&drawn, &reference, BLACK, 50);
