@@ -43,7 +43,7 @@ def run(code: str, folder: pathlib.Path) -> str:
 
 
 @pytest.mark.parametrize("classification", ["before", "after"])
-@pytest.mark.parametrize(("backend", "side"), [("cpu", 16384), ("reference", 2048)])
+@pytest.mark.parametrize(("backend", "side"), [("cpu", 6144), ("reference", 700)])
 def test_drawing(backend: str, side: int, classification: str, tmp_path: pathlib.Path) -> None:
     """A view of the native backend, which stops, draws as ever afterwards."""
     code = f"""
@@ -65,7 +65,7 @@ def test_drawing_by_the_gpu(tmp_path: pathlib.Path) -> None:
     found = subprocess.run([sys.executable, "-c", SCRIPT + probe], capture_output=True, text=True, timeout=300)
     if "DeviceError" in found.stderr:
         pytest.skip("there is no GPU")
-    draw = 'lambda: sheetsplat.render("builtin:head:64", backend="gpu", image=image(4096))'
+    draw = 'lambda: sheetsplat.render("builtin:head:64", backend="gpu", image=image(1500))'
     for after in (0.1, 1.0):
         run(f"interrupted({draw}, {after})", tmp_path)
 
@@ -73,7 +73,7 @@ def test_drawing_by_the_gpu(tmp_path: pathlib.Path) -> None:
 def test_the_first_picture_of_a_path(tmp_path: pathlib.Path) -> None:
     """NumPy is prepared for it, by Python code that Ctrl-C must not end."""
     begin = 'assert "numpy" not in sys.modules\n'
-    run(begin + 'interrupted(lambda: sheetsplat.render("builtin:head:64", image=image(16384)))', tmp_path)
+    run(begin + 'interrupted(lambda: sheetsplat.render("builtin:head:64", image=image(6144)))', tmp_path)
     # About when a small one is complete.
     for after in (0.005, 0.01, 0.02, 0.04):
         draw = 'lambda: (sheetsplat.render("builtin:head:16", image=image(64)), time.sleep(10))'
@@ -81,19 +81,19 @@ def test_the_first_picture_of_a_path(tmp_path: pathlib.Path) -> None:
 
 
 def test_reading(tmp_path: pathlib.Path) -> None:
-    run('interrupted(lambda: sheetsplat.Volume("builtin:head:640"))', tmp_path)
+    run('interrupted(lambda: sheetsplat.Volume("builtin:head:400"))', tmp_path)
 
 
 def test_pictures_that_are_saved(tmp_path: pathlib.Path) -> None:
     """Neither a part of a file, nor the whole file later, nor a temporary one."""
     code = """
 import numpy as np
-picture = sheetsplat.Image(np.random.default_rng(1).random((4096, 4096, 4), np.float32))
+picture = sheetsplat.Image(np.random.default_rng(1).random((2048, 2048, 4), np.float32))
 interrupted(lambda: picture.save("a.png", depth=16), 0.5)
 """
     run(code, tmp_path)
     assert os.listdir(tmp_path) == []
-    run(code + "time.sleep(20)", tmp_path)
+    run(code + "time.sleep(8)", tmp_path)
     assert os.listdir(tmp_path) == []
 
 
