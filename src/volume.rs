@@ -8,7 +8,7 @@ pub use sheetsplat_volume::{
     open_raw_store, open_store, sample,
 };
 
-#[cfg(feature = "gpu")]
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 pub(crate) use sheetsplat_volume::internals::HollowChannel;
 pub(crate) use sheetsplat_volume::internals::{
     Access, AdaptedStore, COLOR_BYTES, Resampling, SIZES, SPACING, Selection, check_grids, check_spacing, dims_of,
