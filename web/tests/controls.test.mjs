@@ -19,7 +19,8 @@ beforeEach(async () => {
     ({ page: shown, faults } = await api(opened, { hasTouch: true }));
     await shown.evaluate(async (size) => {
         const view = await window.make(size, { backend: "cpu", workers: 1, controls: true });
-        await view.setScene("volume.builtin = \"head:12\"");
+        // Level, so that a turn about up is as large as that of the direction.
+        await view.setScene("volume.builtin = \"head:12\"", { set: { "camera.direction": [0, 1, 0] } });
     }, [WIDTH, HEIGHT]);
     start = await camera(shown);
     box = await shown.locator("canvas").boundingBox();
