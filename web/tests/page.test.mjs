@@ -48,8 +48,9 @@ for (const [backend, size] of [["cpu", SMALL], ["gpu", TINY]]) {
         await shown.mouse.move(box.x + box.width / 2 + box.height / 2, box.y + box.height / 2, { steps: 5 });
         await shown.mouse.up();
         const turned = await direction(shown);
-        // Half a height is 90 degrees.
-        const cosine = before.reduce((sum, component, axis) => sum + component * turned[axis], 0) / (Math.hypot(...before) * Math.hypot(...turned));
+        // Half a height is 90 degrees about z.
+        const [from, to] = [before, turned].map(([x, y]) => [x, y]);
+        const cosine = (from[0] * to[0] + from[1] * to[1]) / (Math.hypot(...from) * Math.hypot(...to));
         assert.ok(Math.abs(cosine) < 0.02, `${before} ${turned}`);
         await shown.waitForTimeout(300);
         const drawn = await frames.jsonValue();
