@@ -326,7 +326,7 @@ def test_rough_pictures_do_not_minify_the_volume(monkeypatch: pytest.MonkeyPatch
     wait_for(widths, 1)
     view.gate.release(4)
     # Pixels are half as large as voxels, and larger ones would not be; then as large as voxels.
-    for zoom, expected in [(0.55, [96, 192]), (0.25, [192])]:
+    for zoom, expected in [(0.4, [96, 192]), (0.25, [192])]:
         del widths[:]
         widget.zoom = zoom
         wait_for(widths, len(expected))
