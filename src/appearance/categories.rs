@@ -121,13 +121,13 @@ impl Borders {
 }
 
 /// A label's colour (red, green and blue in [0, 1]), the same in every volume. Hues advance by the golden angle, so that neighbours in number are far apart,
-/// and lightness goes round three steps. Among numbers that do so, these keep the first 16 labels farthest from each other (CIEDE2000: 21.7).
+/// and lightness goes round three steps, with another one after 21 labels, when hues are nearly the same again. Among numbers that do so, these keep the first 16 labels farthest from each other (at least 24 in CIE L*a*b*).
 pub fn color(label: u16) -> DVec3 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
-    const LIGHTNESS: [f64; 3] = [0.623, 0.43, 0.822];
+    const LIGHTNESS: [f64; 3] = [0.66, 0.49, 0.86];
     let hue = TAU * (0.818 + f64::from(label) * GOLDEN).fract();
     // Three digits suffice and are easier to read in a scene file.
-    (oklch(LIGHTNESS[usize::from(label % 3)], 0.227, hue) * 1e3).round() / 1e3
+    (oklch(LIGHTNESS[usize::from((label % 63 + label % 63 / 21) % 3)], 0.227, hue) * 1e3).round() / 1e3
 }
 
 /// A label map's transfer function, by the colours that its file states or else [`color`]. Each colour is at its label's number, so no voxel has a colour in

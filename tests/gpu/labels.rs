@@ -212,6 +212,9 @@ fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
 /// Draws a scene by everything that draws it, with and without culling, and compares with the f64 evaluation.
 fn check(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) {
     let transfer = scene.transfer.resolve(volume);
+    let mut scene = scene.clone();
+    scene.splatting.culling = false;
+    let scene = &scene;
     let expected = reference::render(volume, &transfer, scene).unwrap();
     let counts = reference::count(volume, &transfer, scene).unwrap();
     let plain = TransferFunction { labels: BTreeMap::new(), ..transfer };

@@ -39,7 +39,10 @@ impl Marched {
 }
 
 fn twin(volume: &Volume, scene: &Scene) -> Image {
-    reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+    let mut scene = scene.clone();
+    // Rays march to their ends.
+    scene.splatting.culling = false;
+    reference::render(volume, &scene.transfer.resolve(volume), &scene).unwrap()
 }
 
 /// Asserts that the f64 evaluation, the GPU and the native backend come as close to the march as required, in dB.
@@ -48,13 +51,11 @@ fn assert_close(name: &str, volume: Volume, mut scene: Scene, stride: u32, requi
     let by_twin = marched.psnr(&twin(&volume, &scene));
     let gpu = gpu();
     let drawn = DRAWINGS.map(|drawing| {
-        [false, true].map(|culling| {
-            scene.splatting.culling = culling;
-            marched.psnr(&drawing.render(gpu, &volume, &scene).image)
-        })
+        scene.splatting.culling = false;
+        marched.psnr(&drawing.render(gpu, &volume, &scene).image)
     });
-    println!("{name}: twin {by_twin:.1} dB; by {DRAWINGS:?}, without and with culling: {drawn:.1?} dB");
-    let all = [&[by_twin][..], drawn.as_flattened()].concat();
+    println!("{name}: twin {by_twin:.1} dB; by {DRAWINGS:?}: {drawn:.1?} dB");
+    let all = [&[by_twin][..], &drawn].concat();
     all.iter().for_each(|&decibels| assert_at_least(decibels, required, name));
 }
 

@@ -75,6 +75,7 @@ fn cuts_shorten_rays() {
 fn sheets_make_the_image() {
     let (volume, mut scene) = head();
     (scene.image.width, scene.image.height) = (24, 20);
+    scene.splatting.culling = false;
     for (compositing, projection) in [(Compositing::Linear, None), (Compositing::Exponential, Some(eye(600.0)))] {
         scene.splatting.compositing = compositing;
         scene.camera.projection = projection.unwrap_or(scene.camera.projection);

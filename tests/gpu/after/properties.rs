@@ -171,32 +171,6 @@ fn a_uniform_slab_is_as_opaque_as_it_is_thick() {
     }
 }
 
-/// Where pixels stop by themselves, an opaque one stops where a group of sheets of one `unit` ends, four sheets at most, and not in the middle of matter, just beyond
-/// the threshold.
-#[test]
-fn opaque_pixels_stop_behind_groups_of_sheets() {
-    let volume = volume([24, 16, 24], DVec3::ONE, |_| 1.0);
-    let mut scene = scene(9, 9);
-    scene.camera = camera([0.0, 1.0, 0.0], 6.0);
-    scene.splatting.compositing = Compositing::Exponential;
-    scene.shading.enabled = false;
-    // Pixels become opaque 3.3 units behind the volume's near side, which is a multiple of the slab widths from its middle.
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.6)]);
-    for (slab_width, units) in [(2.0, 4.0), (1.0, 4.0), (0.5, 4.0), (0.25, 4.0), (0.125, 3.5)] {
-        scene.splatting.slab_width = slab_width;
-        let by_cores = cpu::render(volume.clone(), &scene).unwrap().image;
-        scene.splatting.rasterizer = Rasterizer::Tiles;
-        let by_tiles = gpu().render_volume(volume.clone(), &scene).unwrap().image;
-        for (name, image) in [("cpu", by_cores), ("tiles", by_tiles)] {
-            let expected = 1.0 - 0.4_f64.powf(units);
-            for pixel in &image.pixels {
-                let what = format_args!("{name}, slab width {slab_width}: {pixel:?}, not {expected}");
-                assert_at_most((f64::from(pixel[3]) - expected).abs(), 1e-5, what);
-            }
-        }
-    }
-}
-
 #[test]
 fn thinner_slabs_converge() {
     for draw in DRAWINGS {

@@ -98,7 +98,10 @@ fn every_preset_shows_something_of_every_builtin() {
             if kind == Preset::Labels && name.starts_with("nerve") {
                 continue;
             }
-            let scene = builtin_scene(name, &[&format!("preset={preset}"), "image.width=64", "image.height=64"]);
+            let scene = builtin_scene(
+                name,
+                &[&format!("preset={preset}"), "image.width=64", "image.height=64", "camera.direction=[0,1,0]"],
+            );
             // Without contrast agent few vessels are visible, and thin branches are faint in a sum.
             let least = match kind {
                 Preset::CtVessels => 20,
