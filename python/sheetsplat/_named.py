@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Arranged", "arranged", "is_named"]
 
-#: What a dim is, by its name in small letters.
+#: The roles of dims by their names in small letters.
 _ROLES = {
     **dict.fromkeys(("z", "depth", "slice", "slices", "plane", "pln"), "z"),
     **dict.fromkeys(("y", "row", "rows", "height"), "y"),
@@ -88,7 +88,7 @@ def arranged(source: Any, channel_axis: int | None, channel: int | None, time: i
     z, y, x = _steps(axes)
     unit = _unit(axes, is_spaced)
     ordered = [channel.transpose(*order) for channel in channels]
-    # What holds the values may have a mask.
+    # The array under the names may have a mask.
     return Arranged([getattr(channel, "data", channel) for channel in ordered], (z, y, x), unit, like)
 
 
@@ -97,7 +97,7 @@ def _listed(dims: Any) -> str:
 
 
 def _dims(dims: tuple[Any, ...], channel_axis: int | None) -> dict[str, Any]:
-    """The dims by what they are."""
+    """The dims by their roles."""
     named = list(dims)
     found: dict[str, Any] = {}
     if channel_axis is not None:

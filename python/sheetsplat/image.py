@@ -47,7 +47,7 @@ class Image:
     stats: dict[str, Any]
     _array: NDArray[np.float32]
     _made_on: tuple[str, str] | None
-    #: What was read for it, none of which it may replace.
+    #: The files that were read for it; it may replace none of them.
     _inputs: Sequence[_native.Inputs]
 
     def __init__(self, array: Any) -> None:
@@ -152,7 +152,7 @@ class Image:
         _native.save(self._array, path, depth, self._inputs)
 
     def __reduce__(self) -> Any:
-        # What was read for it bears on this process alone.
+        # The files that were read matter in this process alone.
         return Image._of, (self._array, self.stats, self._made_on)
 
     def _repr_png_(self) -> bytes:

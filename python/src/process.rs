@@ -62,7 +62,7 @@ pub(crate) fn may_commit() -> bool {
     JOB.with_borrow(|job| job.as_ref().is_none_or(|job| job.change(COMMITTED)))
 }
 
-/// What some work gave, unless it panicked, and its warnings.
+/// The result of work and its warnings, or the panic that ended it.
 type Done<T> = thread::Result<(Result<T, Raised>, Vec<Warning>)>;
 
 /// Runs without Python's lock, then warns. Signals reach Python's main thread alone: there another thread works, and Ctrl-C leaves it at once. What

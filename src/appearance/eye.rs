@@ -64,7 +64,7 @@ impl Eye {
         }
         let extents = samples * spacing;
         let flat = least_axis(extents);
-        // With the smallest extent in its place, the least of all three is the middle one.
+        // The middle extent is the smaller one of the other two.
         let middle = DVec3::select(axis(flat).cmpgt(DVec3::ZERO), DVec3::INFINITY, extents).min_element();
         if extents[flat] <= middle / 2.0 { Self::Flat(flat) } else { Self::Unknown }
     }

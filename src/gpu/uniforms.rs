@@ -19,6 +19,7 @@ use crate::kernel::Kernel;
 use crate::lists::patch_bins::PatchBins;
 use crate::lists::quad_plan::FramePlan;
 use crate::scene::Scene;
+use crate::scene::image_settings::premultiplied;
 use crate::settings::clip::HalfSpace;
 use crate::settings::closing::Closing;
 use crate::settings::shading::{Light, MAX_SHADING, MIN_GRADIENT, Shading};
@@ -40,7 +41,6 @@ pub fn frame(
         Light::Direction(direction) => scaled(direction).normalize(),
     };
     let Shading { enabled, ambient, diffuse, specular, shininess, .. } = scene.shading;
-    let [r, g, b, a] = scene.image.background;
     let matrix = |m: &DMat2| m.to_cols_array().map(|x| x as f32);
     let [color_end, opacity_end, gradient_opacity_end] = ramps.ends;
     let warped = grid_warp::m_view_warped(&view.basis, grid.aspect());
@@ -58,7 +58,7 @@ pub fn frame(
         light: to_light.extend(f64::from(u8::from(enabled))).as_vec4().to_array(),
         half_vector: half_vector(to_light, to_eye).extend(0.0).as_vec4().to_array(),
         shading: [ambient, diffuse, specular, shininess].map(|x| x.clamp(0.0, MAX_SHADING) as f32),
-        background: DVec4::new(r * a, g * a, b * a, a).as_vec4().to_array(),
+        background: premultiplied(scene.image.background),
         gradient: (0.5 / grid.aspect()).extend(MIN_GRADIENT).as_vec4().to_array(),
         dims: grid.dims.extend(0).to_array(),
         ramps: [color_end, opacity_end, gradient_opacity_end, 0],

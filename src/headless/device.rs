@@ -40,7 +40,7 @@ fn has_device_file() -> bool {
         let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
         entries.any(|entry| entry.file_name().to_string_lossy().starts_with(start))
     };
-    // Those of the kernel's own drivers, of NVIDIA's, of Windows' under WSL, and of Mali's.
+    // The kernel's own drivers, NVIDIA's, Windows' under WSL, and Mali's have files of their own.
     let has = || {
         [("/dev/dri", "renderD"), ("/dev", "nvidia"), ("/dev", "dxg"), ("/dev", "mali")]
             .iter()

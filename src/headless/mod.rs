@@ -254,8 +254,8 @@ impl Headless {
             (_, ViewBackend::Boxed(view)) if view.backend() == self.backend() => view.draw(self),
             (_, other) => Err(self.refuse(other.backend()).into()),
         }?;
-        if let Some(reason) = blank::reason(&rendering, view.scene(), view.volume().sample()) {
-            log::warn!("{reason}");
+        if blank::is_blank(&rendering.image, view.scene().image.background) {
+            log::warn!("{}", blank::reason(&rendering.stats, view.volume().sample()));
         }
         let store = rendering.stats.store.or(reads);
         Ok(Rendering { stats: Stats { store, ..rendering.stats }, ..rendering })

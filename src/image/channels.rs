@@ -2,6 +2,7 @@
 
 use std::cmp::Ordering;
 
+use crate::scene::image_settings::premultiplied;
 use crate::settings::splatting::{Classification, Compositing};
 
 /// How the images of channels become one.
@@ -41,8 +42,7 @@ impl Joining {
 
     /// Makes joined pixels an image over a background of straight alpha.
     pub(crate) fn finish(self, pixels: &mut [[f32; 4]], background: [f64; 4]) {
-        let [r, g, b, a] = background;
-        let background = [r * a, g * a, b * a, a].map(|channel| channel as f32);
+        let background = premultiplied(background);
         for pixel in pixels {
             let joined = match self {
                 Self::Sum => pixel.map(|channel| channel.min(1.0)),

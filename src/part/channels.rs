@@ -64,12 +64,12 @@ pub(super) fn hash_of(channels: &[Vec<f32>]) -> String {
     hash.finalize().to_hex().to_string()
 }
 
-/// Checks that channels are those that were written, if the file states their hash.
-pub(super) fn check_hash(path: &Path, stated: Option<String>, channels: &[Vec<f32>]) -> Result<(), ImageError> {
-    match stated.filter(|stated| *stated != hash_of(channels)) {
-        Some(stated) => Err(content(path, "part.pixels", "other pixels".to_owned(), format!("those of hash {stated}"))),
-        None => Ok(()),
+/// Checks that channels are those that were written, by their hash.
+pub(super) fn check_hash(path: &Path, stated: &str, channels: &[Vec<f32>]) -> Result<(), ImageError> {
+    if stated == hash_of(channels) {
+        return Ok(());
     }
+    Err(content(path, "part.pixels", "other pixels".to_owned(), format!("those of hash {stated}")))
 }
 
 /// Reserves the memory of a part's pixels, which its file's bytes must be able to hold.

@@ -49,9 +49,8 @@ struct Description {
     /// For `average` classified after splatting, of every image.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     means: Vec<Mean>,
-    /// The hash of all channels, by which damage is found; not in files of former versions.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pixels: Option<String>,
+    /// The hash of all channels, by which damage is found.
+    pixels: String,
 }
 
 fn one() -> usize {
@@ -158,12 +157,12 @@ pub(super) fn to_json(part: &Part) -> serde_json::Result<String> {
         background: identity.background,
         images: identity.images,
         means: identity.means.iter().map(Mean::from).collect(),
-        pixels: Some(hash_of(&to_channels(part))),
+        pixels: hash_of(&to_channels(part)),
     })
 }
 
-/// What a JSON text says of the part in a file, and the hash of its channels if it states that.
-pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window, Option<String>), ImageError> {
+/// The identity and window of the part in a file, and the hash of its channels, from a JSON text.
+pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window, String), ImageError> {
     let invalid = |key: &str, found: String, allowed: &str| content(path, key, found, allowed.to_owned());
     let description: Description = serde_json::from_str(text)
         .map_err(|error| invalid("part", error.to_string(), "the description that sheetsplat render writes"))?;

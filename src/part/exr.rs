@@ -82,6 +82,6 @@ pub(super) fn decode(path: &Path, bytes: &[u8], access: &Access) -> Result<Decod
         }
     };
     let channels: Vec<_> = names.iter().map(channel).collect::<Result<_, _>>()?;
-    check_hash(path, pixels, &channels)?;
+    check_hash(path, &pixels, &channels)?;
     Ok((identity, window, channels))
 }

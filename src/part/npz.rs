@@ -78,6 +78,6 @@ pub(super) fn decode(path: &Path, access: &Access) -> Result<Decoded, ImageError
     }
     let channel = |channel: usize| array.values.as_slice().iter().skip(channel).step_by(names.len()).collect();
     let channels: Vec<_> = (0..names.len()).map(channel).collect();
-    check_hash(path, pixels, &channels)?;
+    check_hash(path, &pixels, &channels)?;
     Ok((identity, window, channels))
 }

@@ -1,5 +1,6 @@
 //! The compositing buffer over the background (SPEC §5), as in `shaders/resolve.wgsl`.
 
+use crate::scene::image_settings::premultiplied;
 use crate::settings::closing::Closing;
 use crate::settings::splatting::{Classification, Compositing, Splatting};
 
@@ -22,8 +23,7 @@ impl Resolver {
             (_, compositing) => compositing,
         };
         let closing = Closing::of(splatting);
-        let [r, g, b, a] = background;
-        Self { compositing, closing, background: [r * a, g * a, b * a, a].map(|channel| channel as f32) }
+        Self { compositing, closing, background: premultiplied(background) }
     }
 
     /// A pixel over the background, premultiplied like its argument.

@@ -11,6 +11,11 @@ pub struct ImageSettings {
     pub background: [f64; 4],
 }
 
+/// A background with straight alpha, premultiplied (SPEC §5).
+pub(crate) fn premultiplied([red, green, blue, alpha]: [f64; 4]) -> [f32; 4] {
+    [red * alpha, green * alpha, blue * alpha, alpha].map(|channel| channel as f32)
+}
+
 impl Default for ImageSettings {
     fn default() -> Self {
         Self { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] }

@@ -6,7 +6,7 @@ mod check;
 mod color;
 mod definition;
 mod error;
-mod image_settings;
+pub(crate) mod image_settings;
 mod level;
 mod load;
 pub(crate) mod names;

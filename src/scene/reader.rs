@@ -155,13 +155,10 @@ impl<'a> Section<'a> {
     pub(super) fn finish(self) -> Result<(), SceneError> {
         let Some(name) = self.table.keys().next() else { return Ok(()) };
         let key = self.key(&name.escape_debug().to_string());
-        let similar = |known: &&&str| strsim::jaro(known, name) > 0.8;
-        let meant = self
-            .known
-            .iter()
-            .filter(similar)
-            .max_by(|one, other| strsim::jaro(one, name).total_cmp(&strsim::jaro(other, name)));
-        let found = meant.map_or("an unknown key".to_owned(), |meant| format!("an unknown key (perhaps {meant})"));
+        let similar =
+            self.known.iter().map(|known| (strsim::jaro(known, name), known)).filter(|(share, _)| *share > 0.8);
+        let meant = similar.max_by(|(one, _), (other, _)| one.total_cmp(other));
+        let found = meant.map_or("an unknown key".to_owned(), |(_, meant)| format!("an unknown key (perhaps {meant})"));
         Err(self.origins.invalid(&key, &self.origins.overrides_within(&key), found, self.known.join(", ")))
     }
 

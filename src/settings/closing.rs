@@ -58,7 +58,7 @@ mod tests {
                 let expected = f64::from(alpha) + (1.0 - f64::from(alpha)) * share * share;
                 assert!((f64::from(closed) - expected).abs() < 1e-4, "{threshold} {alpha}: {closed} {expected}");
                 assert!((red - closed).abs() < 1e-6 && (green - 0.5 * closed).abs() < 1e-6 && blue == 0.0);
-                // What lies behind adds at most 1 - alpha, and culling hides it only from T on.
+                // Matter behind the pixel adds at most 1 - alpha, and culling hides it only from T on.
                 assert!(f64::from(closed - alpha) <= 1.0 - threshold + 1e-6, "{threshold} {alpha}");
             }
             assert_eq!(pixel(0.0), [0.0; 4]);

@@ -18,10 +18,10 @@ const LEFT_OUT: f64 = 1e-3;
 /// The moved scenes that show whether a pixel lies next to a decision.
 const TURNS: u64 = 6;
 
-/// What f32 sums may differ by.
+/// The difference that rounding in f32 sums may make.
 const ROUNDING: f64 = 2e-5;
 
-/// What was compared, and what failed.
+/// The number of comparisons, and the failures.
 #[derive(Debug)]
 pub(crate) struct Tally {
     compared: usize,

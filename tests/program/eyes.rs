@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::*;
 
-/// What `info` says of a file's camera: its direction and up, and the line of text that says why.
+/// The direction and up of a file's camera by `info`, and the line of text that says why.
 fn eye(folder: &Folder, arguments: &str) -> ([[f64; 3]; 2], String) {
     let json = folder.run(&format!("info {arguments} --json"));
     assert_eq!(json.code, Some(0), "{}", json.stderr);

@@ -1,4 +1,4 @@
-//! What flags set, by which name errors call them, and what messages look like.
+//! Flags that set keys, their names in errors, and the look of messages.
 
 use crate::*;
 

@@ -81,7 +81,7 @@ impl Outputs {
         Identity::of(path).ok().and_then(|identity| self.0.get(&identity)).map(|output| output.name.as_str())
     }
 
-    /// Checks that a file, which errors call by a name, is none of these.
+    /// Checks that the file at a path is not an output. Errors call it `named`.
     ///
     /// # Errors
     /// If it is one.
@@ -90,7 +90,7 @@ impl Outputs {
         self.at(path).map_or(Ok(()), |output| Err(would_be_lost(named, output)))
     }
 
-    /// Checks that none of the files in a folder, which errors call by a name, or in those below it, is one of these.
+    /// Checks that no file in a folder, or in a folder below it, is an output. Errors call the folder `named`.
     pub(super) fn check_folder(&self, named: &Path, path: &Path) -> Result<(), VolumeError> {
         self.within(path).map_or(Ok(()), |output| Err(would_be_lost(named, output)))
     }

@@ -237,7 +237,7 @@ impl Volume {
         self.unit.as_deref()
     }
 
-    /// The same volume with another name of the world unit. Those of known units become symbols, such as `micron`; one that says that there is no unit is none.
+    /// The same volume with another world unit, by its name or symbol: `micron` and `um` both become `µm`. `none` and `pixel` mean no unit.
     pub fn with_unit(self, name: &str) -> Self {
         Self { unit: unit::unit(name), ..self }
     }

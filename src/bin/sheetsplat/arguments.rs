@@ -20,7 +20,7 @@ use crate::failure::Failure;
 use crate::outputs::Outputs;
 use crate::reading::Reading;
 
-/// The flags that set keys of the scene.
+/// The flags that set keys of the scene, in the order in which they are applied.
 const FLAGS: [(&str, &str); 13] = [
     ("--dims", "volume.dims"),
     ("--type", "volume.type"),
@@ -101,24 +101,13 @@ struct Look {
     /// The picture's size in pixels, or a window's in points: short for --set image.width=W and image.height=H. W alone is square.
     #[arg(long, value_name = "W[xH]", value_parser = parse_size)]
     size: Option<[u32; 2]>,
-    /// What shows behind the object: a CSS colour as white, #fff or transparent; short for --set image.background=COLOR.
+    /// The colour behind the object, by CSS: white, #fff or transparent. Short for --set image.background=COLOR.
     #[arg(long, value_name = "COLOR")]
     background: Option<String>,
     /// Colours over the visible values, or the palette of the volume's file, in place of the scene's: short for --set
     /// transfer.colormap=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
     colormap: Option<String>,
-}
-
-impl Look {
-    fn sets(&self) -> impl Iterator<Item = String> {
-        let preset = self.preset.iter().map(|name| format!("preset={name}"));
-        let colormap = self.colormap.iter().map(|name| format!("transfer.colormap={name}"));
-        let sizes = self.size.iter().flatten().zip(["width", "height"]);
-        let size = sizes.map(|(pixels, side)| format!("image.{side}={pixels}"));
-        let background = self.background.iter().map(|color| format!("image.background={color}"));
-        preset.chain(colormap).chain(size).chain(background)
-    }
 }
 
 /// The layout of a raw file: shorthand for the scene's keys, applied before --set.
@@ -159,27 +148,6 @@ pub(crate) enum View {
     Right,
     Top,
     Bottom,
-}
-
-impl Raw {
-    /// `time` is that to be shown.
-    fn sets(&self, time: Option<&str>) -> Vec<String> {
-        let array = |key: &str, value: &Option<String>| {
-            value.as_ref().map(|value| format!("volume.{key}=[{}]", value.replace(['x', '×'], ",")))
-        };
-        let plain = |key: &str, value: &Option<String>| value.as_ref().map(|value| format!("volume.{key}={value}"));
-        let sets = [
-            array("dims", &self.dims),
-            plain("type", &self.r#type),
-            plain("endian", &self.endian),
-            plain("offset", &self.offset),
-            array("spacing", &self.spacing),
-            plain("index", &self.channel),
-            time.map(|time| format!("volume.time={time}")),
-            plain("level", &self.level),
-        ];
-        sets.into_iter().flatten().collect()
-    }
 }
 
 impl From<View> for volume::PatientSide {
@@ -228,14 +196,38 @@ impl Input {
     }
 
     fn scene_of(&self, time: Option<&str>, sets: &[String]) -> Result<Scene, Failure> {
-        let sets =
-            self.raw.sets(time).into_iter().chain(self.look.sets()).chain(sets.iter().cloned()).collect::<Vec<_>>();
+        let sets: Vec<String> = self.flags(time).chain(sets.iter().cloned()).collect();
         let scene = match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
             None if self.is_scene_file() => Scene::open_with(self.name.as_ref(), &sets, &self.options()),
             None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
         };
         scene.map_err(|error| self.by_flag(&error))
+    }
+
+    /// What the flags are short for, with a time to be shown.
+    fn flags(&self, time: Option<&str>) -> impl Iterator<Item = String> {
+        let Self { raw: Raw { dims, r#type, endian, offset, spacing, channel, time: _, level }, look, .. } = self;
+        let Look { preset, size, background, colormap } = look;
+        let vector =
+            |numbers: &Option<String>| numbers.as_ref().map(|text| format!("[{}]", text.replace(['x', '×'], ",")));
+        let [width, height] = [0, 1].map(|side| size.map(|size| size[side].to_string()));
+        let texts = [
+            vector(dims),
+            r#type.clone(),
+            endian.clone(),
+            offset.clone(),
+            vector(spacing),
+            channel.clone(),
+            time.map(str::to_owned),
+            level.clone(),
+            preset.clone(),
+            colormap.clone(),
+            width,
+            height,
+            background.clone(),
+        ];
+        FLAGS.iter().zip(texts).filter_map(|((_, key), text)| Some(format!("{key}={}", text?)))
     }
 
     /// The failure of a scene, by the flag's name where a flag has set the key.

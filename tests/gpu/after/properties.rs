@@ -1,10 +1,10 @@
 //! Properties of every image with classification after splatting, whatever draws it.
 
 use glam::{DVec3, UVec3};
-use sheetsplat::cpu;
+use sheetsplat::cpu::{self, CpuRenderer};
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Compositing, Interpolation, Light, Rasterizer};
+use sheetsplat::settings::{Compositing, Interpolation, Light, Rasterizer, Window};
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::after::images::head;
@@ -167,6 +167,36 @@ fn a_uniform_slab_is_as_opaque_as_it_is_thick() {
                 assert_at_most((f64::from(pixel[3]) / expected - 1.0).abs(), draw.exactness, what);
                 assert_at_most((f64::from(pixel[2] / pixel[3]) - 0.9).abs(), 1e-5, what);
             }
+        }
+    }
+}
+
+/// Where pixels stop by themselves, an opaque one stops where a group of sheets of one `unit` ends, four sheets at most, and not in the middle of matter, just beyond
+/// the threshold. Parts show it: pictures are closed.
+#[test]
+fn opaque_pixels_stop_behind_groups_of_sheets() {
+    let volume = volume([24, 16, 24], DVec3::ONE, |_| 1.0);
+    let mut scene = scene(9, 9);
+    scene.camera = camera([0.0, 1.0, 0.0], 6.0);
+    scene.splatting.compositing = Compositing::Exponential;
+    scene.shading.enabled = false;
+    // Pixels become opaque 3.3 units behind the volume's near side, which is a multiple of the slab widths from its middle.
+    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.6)]);
+    let whole = Window::whole([9, 9]);
+    for (slab_width, units) in [(2.0, 4.0), (1.0, 4.0), (0.5, 4.0), (0.25, 4.0), (0.125, 3.5)] {
+        scene.splatting.slab_width = slab_width;
+        let (by_cores, _) = CpuRenderer::new(volume.clone(), &scene).unwrap().draw_part(&whole).unwrap();
+        scene.splatting.rasterizer = Rasterizer::Tiles;
+        let (by_tiles, _) = gpu().draw_part(&mut gpu().view(volume.clone(), &scene).unwrap(), &whole).unwrap();
+        for (name, part) in [("cpu", by_cores), ("tiles", by_tiles)] {
+            let expected = 1.0 - 0.4_f64.powf(units);
+            assert_eq!(part.content.colors.len(), 81, "{name}");
+            for pixel in &part.content.colors {
+                let what = format_args!("{name}, slab width {slab_width}: {pixel:?}, not {expected}");
+                assert_at_most((f64::from(pixel[3]) - expected).abs(), 1e-5, what);
+            }
+            let picture = Image::merge([part]).unwrap();
+            assert!(picture.pixels.iter().all(|pixel| pixel[3] == 1.0), "{name}: closed");
         }
     }
 }

@@ -193,7 +193,7 @@ fn labels_have_colours_of_their_own() {
         assert!(color.min_element() >= 0.0 && color.max_element() <= 1.0, "{color}");
         assert!(color.max_element() > 0.4, "{color} is too dark to be shaded");
         for other in &colors[..at] {
-            assert!(color.distance(*other) > 0.07, "{color} and {other}");
+            assert!(color.distance(*other) > 0.09, "{color} and {other}");
         }
     }
     let transfer = TransferFunction::from_histogram(&three_five());
@@ -359,7 +359,10 @@ fn a_written_scene_is_read_as_the_same() {
         let text = scene.to_toml(Path::new("")).unwrap();
         let read =
             Scene::parse(&text, "scene.toml", Path::new(""), &[]).unwrap_or_else(|error| panic!("{error}\n{text}"));
-        // An eye that the volume chooses is written as it stands.
+        if !text.contains("[camera]") {
+            assert_eq!(read, scene, "{text}");
+        }
+        // A file with a camera or a transfer function cannot leave the eye to the volume: its direction is the default.
         let stated = |scene: Scene| {
             let camera = scene.camera.looking([scene.camera.direction, scene.camera.up]);
             Scene { camera, ..scene }

@@ -25,7 +25,7 @@ const ATTEMPTS: u32 = 3;
 /// The time before a request is sent again; before each further one it is four times as long.
 const PAUSE: Duration = Duration::from_millis(200);
 
-/// What is waited for.
+/// The limits for servers on the internet.
 const LIMITS: Limits = Limits {
     silence: Duration::from_secs(30),
     whole: Duration::from_secs(300),

@@ -18,7 +18,7 @@ pub(super) struct Made {
 }
 
 impl Made {
-    /// Reads a list; it is empty if there is none.
+    /// Reads the list at a path. Without such a file no frame was made.
     ///
     /// # Errors
     /// If it cannot be read.

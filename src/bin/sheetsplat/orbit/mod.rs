@@ -176,7 +176,7 @@ struct Shown<'a> {
 }
 
 impl<'a> Shown<'a> {
-    /// What they show, and the volume at the first time.
+    /// The scene of all frames, and its volume at the first time.
     fn load(
         arguments: &Arguments,
         (scene, times): (Scene, Option<Range<u32>>),
