@@ -131,7 +131,7 @@ pub fn color(label: u16) -> DVec3 {
     (oklch(LIGHTNESS[usize::from((label % 3 + label / 21 % 3) % 3)], 0.274, hue) * 1e3).round() / 1e3
 }
 
-/// A label map's transfer function, by the colours that its file states or else [`color`]. Each colour is at its label's number, so no voxel has a colour in
+/// A label map's transfer function, by the colours that its file states or else [`color()`]. Each colour is at its label's number, so no voxel has a colour in
 /// between.
 pub fn transfer(labels: &[u16], palette: &[(f64, DVec3)]) -> TransferFunction {
     let stated = |label: f64| palette.iter().find(|(value, _)| *value == label).map(|(_, color)| *color);

@@ -135,7 +135,7 @@ impl Scene {
         })
     }
 
-    /// Like [`Self::explicit`], but a camera that fits an object ([`Fit::Object`]) is placed so that the object stays in the image at
+    /// Like [`Self::explicit`], but a camera that fits an object ([`Fit::Object`](crate::settings::Fit::Object)) is placed so that the object stays in the image at
     /// constant size in whichever direction the camera turns: for movies and for cameras that follow a pointer.
     pub fn explicit_all_around(&self, volume: &Volume) -> Self {
         self.explicit_by(volume, |scene, transfer, size| {
