@@ -96,7 +96,8 @@ fn shared<T: Send>(run: impl FnOnce() -> Result<T, Raised> + Send) -> Result<T, 
     static THREADS: OnceLock<Result<(), String>> = OnceLock::new();
     if is_forked() {
         let pool = rayon::ThreadPoolBuilder::new().build().map_err(|error| no_threads(&error))?;
-        return pool.install(run);
+        let job = JOB.with_borrow(Clone::clone);
+        return pool.install(|| as_job(job, run));
     }
     // The error without a source is that somebody has made them before.
     let start = || match rayon::ThreadPoolBuilder::new().build_global() {
@@ -107,6 +108,15 @@ fn shared<T: Send>(run: impl FnOnce() -> Result<T, Raised> + Send) -> Result<T, 
     run()
 }
 
+/// Works in this thread, which may be another one than the job began in.
+fn as_job<T>(job: Option<Arc<Job>>, run: impl FnOnce() -> T) -> T {
+    JOB.set(job.clone());
+    match job {
+        Some(job) => abandon::watch(&job.abandoned, run),
+        None => run(),
+    }
+}
+
 /// Works in another thread, while this one looks for Ctrl-C.
 fn watched<T: Send + 'static>(
     py: Python<'_>,
@@ -115,11 +125,8 @@ fn watched<T: Send + 'static>(
     let job = Arc::new(Job::default());
     let (sender, mut receiver) = sync_channel(1);
     let working = Arc::clone(&job);
-    let work = move || {
-        JOB.set(Some(Arc::clone(&working)));
-        // Nobody may wait any more.
-        let _ = sender.send(abandon::watch(&working.abandoned, || done(run)));
-    };
+    // Nobody may wait any more.
+    let work = move || drop(sender.send(as_job(Some(working), || done(run))));
     let thread = thread::Builder::new().name("sheetsplat".to_owned()).stack_size(STACK).spawn(work);
     thread.map_err(|error| no_threads(&error))?;
     loop {

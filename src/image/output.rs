@@ -9,6 +9,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use sheetsplat_volume::internals::identity::{folder, resolved};
 use tempfile::TempPath;
 
+use crate::abandon::Abandoned;
+
 /// The temporary files by name, which are removed when dropped. The lock is held while one is created, renamed or removed, so the
 /// holder of the lock sees all of them.
 static TEMPORARY: Mutex<BTreeMap<PathBuf, TempPath>> = Mutex::new(BTreeMap::new());
@@ -111,6 +113,10 @@ impl Output {
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(replaced.map_or(0o666, mode)));
         let mut all = temporary();
+        // Asked under the lock: whoever removes what is abandoned at the end of a process finds every file that was made before.
+        if Abandoned::here().is_true() {
+            return Err(io::Error::other("nobody waits for this file"));
+        }
         let (file, path) = builder.prefix(".sheetsplat-").tempfile_in(folder(&target))?.into_parts();
         let aside = Aside { temporary: path.to_path_buf(), target };
         all.insert(aside.temporary.clone(), path);
@@ -299,6 +305,16 @@ mod tests {
         Output::commit([&old, &new, &bad].map(written).into()).unwrap();
         assert!([&old, &new, &bad].iter().all(|path| fs::read_to_string(path).unwrap() == "after"));
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
+    }
+
+    /// Nothing is left at the end of a process, whose last step is to remove what is there.
+    #[test]
+    fn work_that_nobody_waits_for_makes_no_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let abandoned = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(true));
+        let made = crate::abandon::watch(&abandoned, || write(&folder.path().join("a"), b"after"));
+        assert!(made.is_err());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
     #[cfg(unix)]
