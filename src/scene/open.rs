@@ -146,7 +146,28 @@ impl Scene {
 /// If channels or labels lie on several grids, the index is of none of them, or their sample cannot be read.
 fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Option<StreamedVolume>, VolumeError> {
     let memory = options.memory_limit();
-    let Some(Ok((mut first, mut further))) = load::streamed(scene, access) else { return Ok(None) };
+    let (mut first, mut further) = match (load::streamed(scene, access), &options.index) {
+        (Some(Ok(channels)), _) => channels,
+        (_, None) => return Ok(None),
+        (None, Some(path)) => {
+            let [found, allowed] =
+                ["an index for a volume that comes from no file", "none, or one of the volume's store"];
+            return Err(VolumeError::invalid(
+                path.display().to_string(),
+                "index".to_owned(),
+                found.to_owned(),
+                allowed.to_owned(),
+            ));
+        }
+        (Some(Err(error)), Some(_)) => return Err(error),
+    };
+    // It is wrong also where the volume fits into memory.
+    if let Some(path) = &options.index {
+        // The text, and up to five times as many bytes of ranges.
+        let text = access.text(path, memory / 8)?.map_err(|source| VolumeError::io(path, source))?;
+        let origin = path.display().to_string();
+        StreamedVolume::index((&mut first, &mut further), StoreIndex::decode(&origin, &text)?, &origin)?;
+    }
     let (mut bytes, mut largest) = (0, 0_u64);
     let of_voxels =
         |dims: UVec3, each: u64| dims.to_array().into_iter().fold(each, |all, n| all.saturating_mul(n.into()));
@@ -164,12 +185,6 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
     let least = largest.saturating_mul(CHUNKS_OF_THREAD);
     if bytes <= memory || least > memory / 2 {
         return Ok(None);
-    }
-    if let Some(path) = &options.index {
-        // The text, and up to five times as many bytes of ranges.
-        let text = access.text(path, memory / 8)?.map_err(|source| VolumeError::io(path, source))?;
-        let origin = path.display().to_string();
-        StreamedVolume::index((&mut first, &mut further), StoreIndex::decode(&origin, &text)?, &origin)?;
     }
     StreamedVolume::of_channels(first, further, memory).map(Some)
 }

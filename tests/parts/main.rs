@@ -9,6 +9,7 @@ mod common;
 mod files;
 mod means;
 mod merging;
+mod random;
 mod scans;
 mod splitting;
 mod streamed;

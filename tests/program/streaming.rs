@@ -58,6 +58,14 @@ fn a_volume_larger_than_memory_has_the_bytes_of_one_that_fits() {
     folder.write("other.index", "sheetsplat index 1\nidentity 0\n");
     run(&format!("{after} --index other.index -o no.npy"))
         .assert_failure(2, &["other.index: identity: found 0, allowed: ", "that of the store"]);
+    // Where the volume fits into memory, too.
+    for (volume, index, expected) in [
+        (ball, "missing.index", "missing.index: "),
+        (ball, "other.index", "other.index: identity: found 0"),
+        ("builtin:head:16", "ball.index", "ball.index: index: found an index for a volume that comes from no file"),
+    ] {
+        folder.run(&format!("render {volume} --index {index} -o no.npy")).assert_failure(2, &[expected]);
+    }
     folder
         .run(&format!("index {ball} -o ball.raw"))
         .assert_failure(2, &["--output ball.raw: found the same file as the input"]);

@@ -75,7 +75,7 @@ impl ReadOptions {
         Self { level: Some(level), ..self }
     }
 
-    /// These options with an index of the store's chunks.
+    /// These options with an index of the store's chunks. An index that cannot be read, or is another store's, is an error, however small the volume is.
     pub fn with_index(self, index: impl Into<PathBuf>) -> Self {
         Self { index: Some(index.into()), ..self }
     }
