@@ -1,10 +1,8 @@
 //! The preset that fits a volume, where a scene states nothing about its appearance.
 
-use super::{Scene, TransferSettings};
 use crate::appearance::Preset;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Splatting;
-use crate::volume::Volume;
 
 /// What the preset that fits the volume ([`Preset::suggested`]) chooses for a scene without a transfer function: these settings, as long as they have
 /// their defaults, besides colours and opacities. Others than the defaults count as stated.
@@ -38,7 +36,7 @@ impl Fitting {
     }
 
     /// The shading, with a preset's where it is open.
-    fn shading(self, stated: Shading, preset: Preset) -> Shading {
+    pub(super) fn shading(self, stated: Shading, preset: Preset) -> Shading {
         let (of_preset, default) = (preset.shading(), Shading::default());
         let number = |is_open: bool, of: fn(&Shading) -> f64| {
             of(if is_open && of(&stated) == of(&default) { &of_preset } else { &stated })
@@ -54,28 +52,8 @@ impl Fitting {
     }
 
     /// The splatting settings, with a preset's compositing where it is open.
-    fn splatting(self, stated: Splatting, preset: Preset) -> Splatting {
+    pub(super) fn splatting(self, stated: Splatting, preset: Preset) -> Splatting {
         let is_open = self.compositing && stated.compositing == Splatting::default().compositing;
         Splatting { compositing: if is_open { preset.compositing() } else { stated.compositing }, ..stated }
-    }
-}
-
-impl Scene {
-    /// The scene with the preset that fits a volume, [`Preset::None`] if none does, where it states no appearance: no preset, and nothing of a
-    /// transfer function.
-    pub fn fitted(&self, volume: &Volume) -> Self {
-        if !self.is_fitting() {
-            return self.clone();
-        }
-        let preset = Preset::suggested(volume).unwrap_or(Preset::None);
-        let transfer = TransferSettings { preset: Some(preset), ..self.transfer.clone() };
-        let (shading, splatting) =
-            (self.fitting.shading(self.shading, preset), self.fitting.splatting(self.splatting, preset));
-        Self { transfer, shading, splatting, fitting: Fitting::NONE, ..self.clone() }
-    }
-
-    /// Whether the preset that fits is used.
-    pub(super) fn is_fitting(&self) -> bool {
-        self.fitting.is_open && self.further.is_empty() && self.transfer == TransferSettings::default()
     }
 }

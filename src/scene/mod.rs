@@ -231,6 +231,24 @@ impl Scene {
         if is_sharper && splatting.allows_after() { Classification::After } else { Classification::Before }
     }
 
+    /// The scene with the preset that fits a volume, [`Preset::None`] if none does, where it states no appearance: no preset, and nothing of a
+    /// transfer function.
+    pub fn fitted(&self, volume: &Volume) -> Self {
+        if !self.is_fitting() {
+            return self.clone();
+        }
+        let preset = Preset::suggested(volume).unwrap_or(Preset::None);
+        let transfer = TransferSettings { preset: Some(preset), ..self.transfer.clone() };
+        let (shading, splatting) =
+            (self.fitting.shading(self.shading, preset), self.fitting.splatting(self.splatting, preset));
+        Self { transfer, shading, splatting, fitting: Fitting::NONE, ..self.clone() }
+    }
+
+    /// Whether the preset that fits is used.
+    fn is_fitting(&self) -> bool {
+        self.fitting.is_open && self.further.is_empty() && self.transfer == TransferSettings::default()
+    }
+
     /// The scene with a preset, a classification, and a direction of its camera, that no longer depend on the volume.
     pub(crate) fn settled(&self, volume: &Volume) -> Self {
         let fitted = self.fitted(volume);
