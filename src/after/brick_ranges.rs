@@ -65,11 +65,9 @@ impl BrickRanges {
         let bricks = grid.dims.map(|n| n.div_ceil(SIDE)).to_array().map(|n| n as usize);
         let [rx, ry, rz] = reach.to_array().map(|n| n as usize);
         // One axis after the other: the minimum over a box is the minimum over z of those over y of those over x.
-        let along_x: Vec<[f32; 2]> = (coefficients.par_chunks(nx))
-            .flat_map_iter(|row| {
-                around(nx, rx).map(move |range| row.slice(range).iter().fold(EMPTY, |ends, c| union(ends, [c; 2])))
-            })
-            .collect();
+        let of_row = |row: ValueSlice<'_>| -> Vec<[f32; 2]> { row.iter().map(|c| union(EMPTY, [c; 2])).collect() };
+        let along_x: Vec<_> =
+            coefficients.par_chunks(nx).flat_map_iter(|row| around_bricks(&of_row(row), 1, rx)).collect();
         let along_y = strided(&along_x, bricks[0], ny, ry);
         let along_z = strided(&along_y, bricks[0] * bricks[1], nz, rz);
         Self { grid: *grid, ranges: along_z }
@@ -139,16 +137,36 @@ fn around(count: usize, reach: usize) -> impl Iterator<Item = std::ops::Range<us
 
 /// The ranges around bricks along an axis whose steps are `stride` apart, `count` steps in a row.
 fn strided(ends: &[[f32; 2]], stride: usize, count: usize, reach: usize) -> Vec<[f32; 2]> {
-    let block = |block: &[[f32; 2]]| {
-        around(count, reach)
-            .flat_map(|range| {
-                (0..stride)
-                    .map(|at| range.clone().fold(EMPTY, |ends, step| union(ends, block[step * stride + at])))
-                    .collect::<Vec<_>>()
-            })
-            .collect::<Vec<_>>()
-    };
-    ends.par_chunks(stride * count).flat_map_iter(block).collect()
+    ends.par_chunks(stride * count).flat_map_iter(|block| around_bricks(block, stride, reach)).collect()
+}
+
+/// The ranges around bricks along the outermost axis of a block, whose steps are `stride` apart. Of groups as long as what is around a brick, the
+/// range from the group's start to each step, and from each step to its end, is found once: what is around a brick lies in two groups (van Herk 1992,
+/// doi:10.1016/0167-8655(92)90069-C), so that the time does not grow with the reach, which is long where a picture is small.
+fn around_bricks(block: &[[f32; 2]], stride: usize, reach: usize) -> Vec<[f32; 2]> {
+    let count = block.len() / stride;
+    let length = SIDE as usize + 2 * reach.min(count);
+    let (mut from_start, mut to_end) = (block.to_vec(), block.to_vec());
+    for group in from_start.chunks_mut(length * stride) {
+        (stride..group.len()).for_each(|at| group[at] = union(group[at - stride], group[at]));
+    }
+    for group in to_end.chunks_mut(length * stride) {
+        (0..group.len() - stride).rev().for_each(|at| group[at] = union(group[at], group[at + stride]));
+    }
+    let mut ranges = Vec::with_capacity(count.div_ceil(SIDE as usize) * stride);
+    for around in around(count, reach) {
+        let (first, last) = (around.start, around.end - 1);
+        ranges.extend((0..stride).map(|at| {
+            let (to_end, from_start) = (to_end[first * stride + at], from_start[last * stride + at]);
+            match (first / length == last / length, first.is_multiple_of(length)) {
+                (false, _) => union(to_end, from_start),
+                (true, true) => from_start,
+                // The axis ends within the group.
+                (true, false) => to_end,
+            }
+        }));
+    }
+    ranges
 }
 
 #[cfg(test)]
@@ -161,23 +179,24 @@ mod tests {
 
     #[test]
     fn extremes_are_those_of_all_voxels_around() {
-        let grid = Grid::new(UVec3::new(13, 6, 9), DVec3::ONE);
+        let grid = Grid::new(UVec3::new(29, 6, 17), DVec3::ONE);
         let value =
             |index: u32| if index % 29 == 3 { f32::NAN } else { (index.wrapping_mul(2_654_435_761) >> 20) as f32 };
         let values: Vec<f32> = (0..grid.dims.element_product()).map(value).collect();
-        let reach = UVec3::new(2, 5, 1);
-        let ours = BrickRanges::new(&grid, (&values).into(), reach);
         let bricks = grid.dims.map(|n| n.div_ceil(SIDE));
-        assert_eq!(ours.ranges.len() as u32, bricks.element_product());
-        for (at, &ends) in (0..).zip(&ours.ranges) {
-            let first = UVec3::new(at % bricks.x, at / bricks.x % bricks.y, at / (bricks.x * bricks.y)) * SIDE;
-            let (low, high) = (first.saturating_sub(reach), (first + SIDE + reach).min(grid.dims));
-            let inside = |&index: &u32| {
-                let voxel = grid.voxel_at(index);
-                voxel.cmpge(low).all() && voxel.cmplt(high).all()
-            };
-            let found = (0..values.len() as u32).filter(inside).map(|index| values[index as usize]);
-            assert_eq!(ends, found.fold(EMPTY, |ends, value| union(ends, [value; 2])), "{at}");
+        for reach in [UVec3::new(2, 5, 1), UVec3::new(0, 1, 2), UVec3::new(3, 0, 4), UVec3::new(40, 2, 9)] {
+            let ours = BrickRanges::new(&grid, (&values).into(), reach);
+            assert_eq!(ours.ranges.len() as u32, bricks.element_product());
+            for (at, &ends) in (0..).zip(&ours.ranges) {
+                let first = UVec3::new(at % bricks.x, at / bricks.x % bricks.y, at / (bricks.x * bricks.y)) * SIDE;
+                let (low, high) = (first.saturating_sub(reach), (first + SIDE + reach).min(grid.dims));
+                let inside = |&index: &u32| {
+                    let voxel = grid.voxel_at(index);
+                    voxel.cmpge(low).all() && voxel.cmplt(high).all()
+                };
+                let found = (0..values.len() as u32).filter(inside).map(|index| values[index as usize]);
+                assert_eq!(ends, found.fold(EMPTY, |ends, value| union(ends, [value; 2])), "{at}, {reach}");
+            }
         }
     }
 

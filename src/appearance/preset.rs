@@ -11,7 +11,7 @@ use super::{categories, channel_display, xray};
 #[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::settings::shading::Shading;
-use crate::settings::splatting::Compositing;
+use crate::settings::splatting::{Compositing, Splatting};
 use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::{ValueSlice, Volume};
 
@@ -39,6 +39,8 @@ pub enum Preset {
     Fusion,
     /// A volume of colours (SPEC §10), such as photographed slices: opaque, in these colours. Other volumes are gray.
     Photo,
+    /// No preset: a surface around what stands out ([`TransferFunction::from_histogram`]), even where another preset fits.
+    None,
 }
 
 /// Control points at Hounsfield units.
@@ -46,7 +48,7 @@ type Points<T> = [(f64, T)];
 
 impl Preset {
     /// All presets with their names in scene files.
-    pub const ALL: [(&'static str, Self); 10] = [
+    pub const ALL: [(&'static str, Self); 11] = [
         ("ct-skin", Self::CtSkin),
         ("ct-bone", Self::CtBone),
         ("ct-vessels", Self::CtVessels),
@@ -57,13 +59,14 @@ impl Preset {
         ("labels", Self::Labels),
         ("fusion", Self::Fusion),
         ("photo", Self::Photo),
+        ("none", Self::None),
     ];
 
     /// Light and material.
     pub fn shading(self) -> Shading {
         let shading = Shading::default();
         match self {
-            Self::CtSkin | Self::Fusion => shading,
+            Self::CtSkin | Self::Fusion | Self::None => shading,
             // Where a cut opens a head, gradients are mostly noise.
             Self::MrHead => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
             Self::CtBone | Self::CtVessels => Shading { specular: 0.35, shininess: 40.0, ..shading },
@@ -80,6 +83,7 @@ impl Preset {
         match self {
             Self::Xray => Compositing::Xray,
             Self::Mip => Compositing::Maximum,
+            Self::None => Splatting::default().compositing,
             _ => Compositing::Exponential,
         }
     }
@@ -128,6 +132,7 @@ impl Preset {
             Self::Confocal => confocal(volume),
             Self::Labels => labels(volume).unwrap_or_else(|| TransferFunction::from_histogram(volume)),
             Self::Fusion => Object::find(values).map_or_else(|| constant(0.1), |object| glass(volume, &object)),
+            Self::None => TransferFunction::from_histogram(volume),
             Self::Photo => Object::find(values).map_or_else(|| constant(0.5), |object| solid(&object)),
         }
     }

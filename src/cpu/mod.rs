@@ -99,8 +99,8 @@ impl CpuRenderer {
         scene.check_volume(&volume)?;
         check(scene)?;
         let (simd, level) = simd::chosen()?;
-        let transfer = scene.resolve(&volume);
         let scene = scene.settled(&volume);
+        let transfer = scene.resolve(&volume);
         let layers = layer::layers(&volume, &transfer, &scene)?;
         Ok(Self { volume, scene, transfer, layers, simd, level, first_hit: None, surfaces: None, hits: None })
     }
@@ -135,8 +135,8 @@ impl CpuRenderer {
         scene.check()?;
         scene.check_volume(&self.volume)?;
         check(scene)?;
-        let transfer = scene.resolve(&self.volume);
         let scene = scene.settled(&self.volume);
+        let transfer = scene.resolve(&self.volume);
         layer::update(&mut self.layers, (&self.volume, &transfer), (&self.scene, &scene))?;
         (self.scene, self.transfer) = (scene, transfer);
         Ok(())

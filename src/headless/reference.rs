@@ -37,8 +37,9 @@ impl ReferenceView {
         let volume = volume.into();
         scene.check()?;
         scene.check_volume(&volume)?;
+        let scene = scene.settled(&volume);
         let transfer = scene.resolve(&volume);
-        Ok(Self { scene: scene.settled(&volume), volume, transfer, first_hit: None, hits: None })
+        Ok(Self { scene, volume, transfer, first_hit: None, hits: None })
     }
 
     pub(super) fn volume(&self) -> &Arc<Volume> {

@@ -51,9 +51,9 @@ impl SceneView {
         check_device(device, volume.device(), "the volume")?;
         scene.check()?;
         scene.check_volume(volume.volume())?;
+        let scene = scene.settled(volume.volume());
         let transfer = scene.resolve(volume.volume());
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
-        let scene = scene.settled(volume.volume());
         let splatting = &scene.splatting;
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, splatting))?;
         Ok(Self { volume, scene, hiding: None, first_hit: None, window: None, frame: None, extent: OnceLock::new() })

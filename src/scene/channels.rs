@@ -41,6 +41,9 @@ impl Scene {
     /// magenta and yellow, …); those whose opacities are not, a window of their values each. Label maps among them keep their labels' colours, unless a
     /// preset shows projections.
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
+        if self.is_fitting() {
+            return self.fitted(volume).resolve(volume);
+        }
         let mut channels = (0..).zip(volume.channels()).map(|(number, channel)| {
             if self.settings_of(number).visible {
                 self.transfer_of(number, volume, channel)
@@ -67,7 +70,7 @@ impl Scene {
             && categories::is_label_map(channel);
         let chosen = |preset: Option<Preset>| match preset {
             _ if shows_labels => labels_of_several(channel, preset),
-            None | Some(Preset::Confocal) => one_of_several(channel),
+            None | Some(Preset::None | Preset::Confocal) => one_of_several(channel),
             Some(preset) if number > 0 => preset.transfer_of_further(channel),
             Some(preset) => preset.transfer(channel),
         };

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use glam::DVec3;
 
-use super::{Channel, ImageSettings, TransferSettings, VolumeSource};
+use super::{Channel, Fitting, ImageSettings, TransferSettings, VolumeSource};
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
@@ -49,6 +49,8 @@ pub struct Scene {
     pub shading: Shading,
     /// Kernel, slabs, compositing, culling.
     pub splatting: Splatting,
+    /// What the preset that fits the volume chooses.
+    pub fitting: Fitting,
 }
 
 impl Scene {
@@ -70,6 +72,7 @@ impl Scene {
             further: Vec::new(),
             shading: Shading::default(),
             splatting: Splatting { classification: Classification::Auto, ..Splatting::default() },
+            fitting: Fitting::ALL,
         }
     }
 }

@@ -6,6 +6,7 @@ mod check;
 mod color;
 mod definition;
 mod error;
+mod fitting;
 pub(crate) mod image_settings;
 mod level;
 mod load;
@@ -27,6 +28,7 @@ use toml::Table;
 pub use channel::Channel;
 pub use definition::Scene;
 pub use error::SceneError;
+pub use fitting::Fitting;
 pub use image_settings::ImageSettings;
 pub use open::OpenVolume;
 pub use source::VolumeSource;
@@ -147,9 +149,9 @@ impl Scene {
     fn explicit_by(&self, volume: &Volume, fit: impl Fn(&Self, &TransferFunction, [u32; 2]) -> Option<Camera>) -> Self {
         let settled = self.settled(volume);
         let ImageSettings { width, height, .. } = self.image;
-        let camera = fit(&settled, &self.resolve(volume), [width, height]).unwrap_or(settled.camera);
+        let camera = fit(&settled, &settled.resolve(volume), [width, height]).unwrap_or(settled.camera);
         let camera = camera.explicit(volume.drawn_grid(), self.splatting.radius, width, height);
-        let mut channels = self.explicit_channels(volume).into_iter();
+        let mut channels = settled.explicit_channels(volume).into_iter();
         let Some(Channel { name, transfer, .. }) = channels.next() else { return self.clone() };
         let level = self.level_in(volume);
         Self { level, camera, name, transfer, further: channels.collect(), ..settled }
@@ -187,7 +189,7 @@ impl Scene {
 
     /// The eye that a volume chooses for the camera; `None` if the scene states its direction or up.
     pub fn eye(&self, volume: &Volume) -> Option<Eye> {
-        self.camera.has_open_eye().then(|| Eye::of(volume, self.transfer.preset))
+        self.camera.has_open_eye().then(|| Eye::of(volume, self.fitted(volume).transfer.preset))
     }
 
     /// The camera with the direction and up that a volume chooses ([`Self::eye`]), or its own.
@@ -212,24 +214,46 @@ impl Scene {
         if splatting.classification != Classification::Auto {
             return splatting.classification;
         }
+        if self.is_fitting() {
+            return self.fitted(volume).classification(volume);
+        }
         let are_several = !volume.further().is_empty();
         let is_sharper = (0..).zip(volume.channels()).all(|(number, volume)| {
             let transfer = &self.settings_of(number).transfer;
             match transfer.preset {
+                None | Some(Preset::None) => !transfer.states_more() && !categories::is_label_map(volume),
                 Some(preset) => {
                     let may_be_labels = are_several && preset.is_classified_after() && preset.keeps_labels();
                     preset.is_classified_after() && !(may_be_labels && categories::is_label_map(volume))
                 }
-                None => *transfer == TransferSettings::default() && !categories::is_label_map(volume),
             }
         });
         if is_sharper && splatting.allows_after() { Classification::After } else { Classification::Before }
     }
 
-    /// The scene with a classification, and a direction of its camera, that no longer depend on the volume.
+    /// The scene with the preset that fits a volume, [`Preset::None`] if none does, where it states no appearance: no preset, and nothing of a
+    /// transfer function.
+    pub fn fitted(&self, volume: &Volume) -> Self {
+        if !self.is_fitting() {
+            return self.clone();
+        }
+        let preset = Preset::suggested(volume).unwrap_or(Preset::None);
+        let transfer = TransferSettings { preset: Some(preset), ..self.transfer.clone() };
+        let (shading, splatting) =
+            (self.fitting.shading(self.shading, preset), self.fitting.splatting(self.splatting, preset));
+        Self { transfer, shading, splatting, fitting: Fitting::NONE, ..self.clone() }
+    }
+
+    /// Whether the preset that fits is used.
+    fn is_fitting(&self) -> bool {
+        self.fitting.is_open && self.further.is_empty() && self.transfer == TransferSettings::default()
+    }
+
+    /// The scene with a preset, a classification, and a direction of its camera, that no longer depend on the volume.
     pub(crate) fn settled(&self, volume: &Volume) -> Self {
-        let splatting = Splatting { classification: self.classification(volume), ..self.splatting };
-        Self { splatting, camera: self.camera_for(volume), ..self.clone() }
+        let fitted = self.fitted(volume);
+        let splatting = Splatting { classification: fitted.classification(volume), ..fitted.splatting };
+        Self { splatting, camera: fitted.camera_for(volume), ..fitted }
     }
 
     /// `source` is the volume of a scene whose tables name none.
@@ -261,13 +285,15 @@ impl Scene {
         root.finish()?;
         let splatting_of_preset = Splatting {
             compositing: preset.map_or(Splatting::default().compositing, Preset::compositing),
-            classification: if states_transfer && preset.is_none() {
+            classification: if states_transfer && preset.is_none_or(|preset| preset == Preset::None) {
                 Classification::Before
             } else {
                 Classification::Auto
             },
             ..Splatting::default()
         };
+        let is_open = preset.is_none() && !states_transfer;
+        let fitting = if is_open { tables::fitting(&shading, &splatting) } else { Fitting::NONE };
         let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
         let Channel { name, visible, volume, spacing, labels, index, time, level, transfer } =
             channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
@@ -287,6 +313,7 @@ impl Scene {
             further: channels.collect(),
             shading: tables::shading(shading, preset.map_or_else(Shading::default, Preset::shading))?,
             splatting: tables::splatting(splatting, splatting_of_preset)?,
+            fitting,
         };
         if scene.transfer.preset == Some(Preset::Labels) && scene.splatting.classification == Classification::After {
             let (key, found) = ("splatting.classification", "\"after\" with preset = \"labels\"");

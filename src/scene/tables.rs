@@ -11,7 +11,7 @@ use super::names::{
 };
 use super::overrides::MAX_CHANNELS;
 use super::reader::{Entry, LABEL, Section};
-use super::{Channel, ImageSettings, SceneError, TransferSettings, VolumeSource};
+use super::{Channel, Fitting, ImageSettings, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::error::setting::Interval;
 use crate::settings::camera::{Camera, FOV_Y, Projection};
@@ -320,6 +320,20 @@ pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shad
     section.finish()?;
     shading.check().map_err(|error| origins.refused(error))?;
     Ok(shading)
+}
+
+/// What a preset may choose of `[shading]` and `[splatting]`: the keys that are missing.
+pub(super) fn fitting(shading: &Section, splatting: &Section) -> Fitting {
+    let is_open = |key: &str| !shading.states(key);
+    Fitting {
+        is_open: true,
+        enabled: is_open("enabled"),
+        ambient: is_open("ambient"),
+        diffuse: is_open("diffuse"),
+        specular: is_open("specular"),
+        shininess: is_open("shininess"),
+        compositing: !splatting.states("compositing"),
+    }
 }
 
 /// Reads `[splatting]` over a preset's values.

@@ -11,7 +11,8 @@ use crate::volume::Volume;
 /// The transfer function as far as a scene states it; the rest is chosen once the volume is known.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TransferSettings {
-    /// The preset that chooses the rest; `None` means [`TransferFunction::from_histogram`].
+    /// The preset that chooses the rest; `None` means the preset that fits ([`Scene::fitted`](crate::scene::Scene::fitted)) where nothing else is
+    /// stated, or else [`TransferFunction::from_histogram`].
     pub preset: Option<Preset>,
     /// The colour map over the visible values, used if `color` is `None`.
     pub colormap: Option<Colormap>,
@@ -37,6 +38,11 @@ impl From<TransferFunction> for TransferSettings {
 }
 
 impl TransferSettings {
+    /// Whether more is stated than a preset.
+    pub(super) fn states_more(&self) -> bool {
+        *self != Self { preset: self.preset, ..Self::default() }
+    }
+
     /// The complete transfer function for a volume. Colours and opacities that are not stated (for labels, too) come from the preset or
     /// from [`TransferFunction::from_histogram`], independently of each other. A colour map covers the visible values ([`Colormap::of`]).
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
@@ -54,7 +60,7 @@ impl TransferSettings {
     ) -> TransferFunction {
         let chosen = || of(self.preset);
         let mut transfer = match (&self.color, &self.opacity) {
-            (Some(color), Some(opacity)) if self.preset.is_none() => {
+            (Some(color), Some(opacity)) if self.preset.is_none_or(|preset| preset == Preset::None) => {
                 TransferFunction::by_value(color.clone(), opacity.clone())
             }
             _ => chosen(),

@@ -9,7 +9,7 @@ use toml::Value;
 use super::names::{
     BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS, name_of,
 };
-use super::{Channel, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
+use super::{Channel, Fitting, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::settings::camera::{Camera, Projection};
 use crate::settings::clip::Clip;
@@ -31,7 +31,7 @@ impl Scene {
     /// # Errors
     /// If the path of the volume or of its labels is not UTF-8, or the offset in a raw file exceeds TOML's integers.
     pub fn to_toml(&self, folder: &Path) -> Result<String, SceneError> {
-        let Self { camera, image, clip, transfer, shading, splatting, .. } = self;
+        let Self { camera, image, clip, transfer, shading, splatting, fitting, .. } = self;
         let mut text = Text::default();
         if let Some(preset) = transfer.preset {
             text.line("preset", name_of(&Preset::ALL, preset));
@@ -44,13 +44,15 @@ impl Scene {
         }
         text.channel = None;
         // Without these tables the camera is this one again (SPEC §2).
-        if !(is_one && !states_transfer(transfer) && *camera == Camera::of_object()) {
+        if !(is_one && !transfer.states_more() && *camera == Camera::of_object()) {
             write_camera(&mut text, camera);
         }
         write_image(&mut text, image);
         write_clip(&mut text, clip);
-        write_shading(&mut text, shading);
-        write_splatting(&mut text, splatting);
+        // What the preset that fits is to choose is not written.
+        let fitting = if self.is_fitting() { *fitting } else { Fitting::NONE };
+        write_shading(&mut text, shading, fitting);
+        write_splatting(&mut text, splatting, fitting);
         Ok(text.text)
     }
 }
@@ -202,7 +204,7 @@ fn write_clip(text: &mut Text, clip: &Clip) {
 fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
     let TransferSettings { preset: _, colormap, color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
     // An empty table would state that the scene has its own transfer function (SPEC §9).
-    if states_transfer(transfer) {
+    if transfer.states_more() {
         text.table("transfer");
     }
     text.given("colormap", colormap.map(|map| name_of(&Colormap::ALL, map)));
@@ -218,19 +220,25 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
     }
 }
 
-/// Whether there is more to a transfer function than a preset.
-fn states_transfer(transfer: &TransferSettings) -> bool {
-    *transfer != (TransferSettings { preset: transfer.preset, ..TransferSettings::default() })
-}
-
-fn write_shading(text: &mut Text, shading: &Shading) {
+fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
+    let default = Shading::default();
     let Shading { enabled, ambient, diffuse, specular, shininess, light, gradient } = *shading;
     text.table("shading");
-    text.line("enabled", enabled);
-    text.line("ambient", ambient);
-    text.line("diffuse", diffuse);
-    text.line("specular", specular);
-    text.line("shininess", shininess);
+    if !(fitting.enabled && enabled == default.enabled) {
+        text.line("enabled", enabled);
+    }
+    if !(fitting.ambient && ambient == default.ambient) {
+        text.line("ambient", ambient);
+    }
+    if !(fitting.diffuse && diffuse == default.diffuse) {
+        text.line("diffuse", diffuse);
+    }
+    if !(fitting.specular && specular == default.specular) {
+        text.line("specular", specular);
+    }
+    if !(fitting.shininess && shininess == default.shininess) {
+        text.line("shininess", shininess);
+    }
     match light {
         Light::Headlight => text.line("light", "headlight"),
         Light::Direction(direction) => text.line("light", vector(direction)),
@@ -238,7 +246,7 @@ fn write_shading(text: &mut Text, shading: &Shading) {
     text.line("gradient", name_of(GRADIENTS, gradient));
 }
 
-fn write_splatting(text: &mut Text, splatting: &Splatting) {
+fn write_splatting(text: &mut Text, splatting: &Splatting, fitting: Fitting) {
     let Splatting { method, radius, falloff, slab_width, footprint, compositing, order, .. } = *splatting;
     let Splatting { opacity_threshold, culling, tiles, rasterizer, footprint_box, experimental, .. } = *splatting;
     let Splatting { classification, interpolation, .. } = *splatting;
@@ -254,7 +262,9 @@ fn write_splatting(text: &mut Text, splatting: &Splatting) {
     }
     text.line("interpolation", name_of(INTERPOLATIONS, interpolation));
     text.line("footprint", name_of(FORMS, footprint));
-    text.line("compositing", name_of(COMPOSITINGS, compositing));
+    if !(fitting.compositing && compositing == Splatting::default().compositing) {
+        text.line("compositing", name_of(COMPOSITINGS, compositing));
+    }
     text.line("order", name_of(ORDERS, order));
     text.line("opacity_threshold", opacity_threshold);
     text.line("culling", culling);

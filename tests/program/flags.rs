@@ -70,11 +70,33 @@ fn a_misspelt_key_suggests_the_key() {
 
 /// Modules and times are for those who ask for a log.
 #[test]
+fn a_window_is_short_for_opacities_and_excludes_others() {
+    let folder = Folder::new();
+    let pixels = |arguments: &str| folder.pixels(&format!("{CUBE} --size 16 --backend cpu {arguments}"));
+    let windowed = pixels("--preset mip --window -20,200");
+    assert_eq!(windowed, pixels("--preset mip --set transfer.opacity=[[-20,0],[200,1]]"));
+    assert_ne!(windowed, pixels("--preset mip --window 100,300"));
+    for (arguments, said) in [
+        ("--window 200,100", ["--window", "200,100", "LO less than HI"]),
+        ("--window 200", ["--window", "200", "LO,HI"]),
+        ("--window nan,1", ["--window", "nan,1", "LO,HI"]),
+        ("--window 0,1e999", ["--window", "1e999", "LO,HI"]),
+        ("--window 0,9 --set transfer.opacity=[[0,1]]", ["--window", "0,9", "--set transfer.opacity=[[0,1]]"]),
+        ("--window 0,9 --preset xray", ["--window", "xray", "another preset"]),
+        ("--window 0,9 --set preset=labels", ["--window", "labels", "another preset"]),
+    ] {
+        folder.run(&format!("render {CUBE} --size 16 {arguments} -o out.png")).assert_failure(2, &said);
+    }
+    assert!(!folder.path("out.png").exists());
+}
+
+#[test]
 fn warnings_are_plain_and_come_once() {
     let folder = Folder::new();
     let values: Vec<f32> = (0..27).map(|i| if i == 13 { f32::NAN } else { i as f32 }).collect();
     folder.write_nrrd("holed.nrrd", [3, 3, 3], [1.0; 3], &values);
-    let run = folder.run("render holed.nrrd --size 9 -o out.png");
+    let stated = "--preset none --set camera.direction=[0,1,0]";
+    let run = folder.run(&format!("render holed.nrrd {stated} --size 9 -o out.png"));
     run.assert_success();
     let message = "sheetsplat: warning: holed.nrrd: 1 of 27 samples are NaN or infinite: these holes are not drawn\n";
     assert_eq!(run.stderr, message);

@@ -1,5 +1,7 @@
 //! Appearance by name, and scenes saved as they were rendered.
 
+use sheetsplat::appearance::Preset;
+
 use crate::*;
 
 const HEAD: &str = "builtin:head:32 --set image.width=60 --set image.height=50 --set camera.direction=[0.5,0.8,-0.2]";
@@ -40,6 +42,54 @@ fn without_a_scene_file_the_object_fills_the_image() {
         let [_, _, top, bottom] = lit(&folder, &format!("a.toml {size} --set camera.fit=object"));
         assert!(bottom - top >= 55, "{keys}: {top} {bottom}");
     }
+}
+
+/// A ball of soft tissue with a core of bone, in air, whose file states no orientation.
+fn write_body(folder: &Folder) {
+    let values = (0..20 * 20 * 20).map(|at: u32| {
+        let [x, y, z] = [at % 20, at / 20 % 20, at / 400].map(|at| f64::from(at) - 9.5);
+        match (x * x + y * y + z * z).sqrt() {
+            radius if radius < 4.0 => 700.0 + (at % 50) as f32,
+            radius if radius < 8.0 => 40.0 + (at % 7) as f32,
+            _ => -1000.0,
+        }
+    });
+    folder.write_nrrd("body.nrrd", [20, 20, 20], [1.0; 3], &values.collect::<Vec<_>>());
+}
+
+#[test]
+fn the_preset_that_fits_is_used_and_told() {
+    let folder = Folder::new();
+    write_body(&folder);
+    let said = |arguments: &str| {
+        let run = folder.run(&format!("render {arguments} --size 24 --backend cpu -o out.npy"));
+        run.assert_success();
+        (run.stderr, folder.read("out.npy"))
+    };
+    let (text, fitting) = said("body.nrrd");
+    let [preset, orientation] = text.lines().collect::<Vec<_>>()[..] else { panic!("{text}") };
+    assert!(preset.starts_with("body.nrrd: preset ct-bone, as the values are Hounsfield units"), "{text}");
+    assert!(orientation.contains("states no orientation") && orientation.contains("camera.up"), "{text}");
+    assert_eq!(said("body.nrrd -q"), (String::new(), fitting.clone()));
+
+    let (text, named) = said("body.nrrd --preset ct-bone --set camera.direction=[0,1,0]");
+    assert_eq!(text, "");
+    assert_eq!(named, said("body.nrrd -q --set camera.direction=[0,1,0]").1);
+    let (text, surface) = said("body.nrrd --preset none");
+    assert!(text.lines().count() == 1 && !text.contains("preset"), "{text}");
+    assert_ne!(surface, fitting);
+    // Whatever states an appearance has no preset that was not asked for.
+    for stated in ["--colormap gray", "--set transfer.iso_ranges=[[-500,2000]]"] {
+        assert_eq!(
+            said(&format!("body.nrrd {stated}")),
+            said(&format!("body.nrrd --preset none {stated}")),
+            "{stated}"
+        );
+    }
+
+    // The scene that is saved states what was chosen.
+    folder.render("body.nrrd -q --size 24 --backend cpu -o out.npy --save-scene saved.toml");
+    assert_eq!(said("saved.toml"), (String::new(), fitting));
 }
 
 #[test]
@@ -156,4 +206,28 @@ fn bad_names_and_files_are_2_and_leave_nothing() {
     run.assert_failure(2, &["no/s.toml", "No such file"]);
     folder.run(&format!("render {HEAD} -o no/a.png --save-scene s.toml")).assert_failure(2, &["no/a.png"]);
     assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn the_gallery_has_a_picture_of_every_preset_by_its_command() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let text = std::fs::read_to_string(root.join("docs/guide/gallery.md")).unwrap();
+    let folder = Folder::new();
+    for (preset, _) in Preset::ALL {
+        let file = format!("{preset}.png");
+        let command = text.lines().find(|line| line.ends_with(&format!(" -o {file}")));
+        let command = command.and_then(|line| line.strip_prefix("sheetsplat ")).unwrap_or_else(|| panic!("{preset}"));
+        assert!(command.contains(&format!(" --preset {preset} ")) && text.contains(&format!("](../gallery/{file})")));
+        let bytes = std::fs::read(root.join("docs/gallery").join(&file)).unwrap();
+        let picture = image::load_from_memory(&bytes).unwrap();
+        assert!(bytes.len() <= 64 << 10 && (picture.width(), picture.height()) == (256, 256), "{file}");
+        // Smaller, the same is drawn.
+        let small = command
+            .replace(":256 ", ":24 ")
+            .replace("builtin:head ", "builtin:head:24 ")
+            .replace("builtin:tomato ", "builtin:tomato:24 ");
+        folder.run(&small.replace("--size 256", "--size 16")).assert_success();
+        let drawn = image::open(folder.path(&file)).unwrap().into_rgb8();
+        assert!(drawn.pixels().any(|pixel| pixel.0 != drawn.get_pixel(0, 0).0), "{command}");
+    }
 }

@@ -70,7 +70,8 @@ impl<'a> Facts<'a> {
         let transfer = seen.resolve(volume);
         let channels = histograms.iter().zip(transfer.channels()).enumerate();
         let preset = scene.transfer.preset;
-        let of_preset = preset.map_or(Splatting::default().compositing, Preset::compositing);
+        let fitted = scene.fitted(volume);
+        let of_preset = fitted.transfer.preset.map_or(Splatting::default().compositing, Preset::compositing);
         Self {
             dims: volume.dims().to_array(),
             spacing: volume.spacing().to_array(),
@@ -83,7 +84,7 @@ impl<'a> Facts<'a> {
             colormaps: Colormap::ALL.iter().map(|(name, _)| *name).collect(),
             preset: preset.and_then(|preset| name_of(&Preset::ALL, preset)),
             slab_width: scene.splatting.slab_width,
-            compositing: compositing_name(scene.splatting.compositing),
+            compositing: compositing_name(fitted.splatting.compositing),
             preset_compositing: compositing_name(of_preset),
             projection: projection_name(&scene.camera),
             planes: scene.clip.planes.clone(),

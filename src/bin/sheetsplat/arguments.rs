@@ -21,7 +21,7 @@ use crate::outputs::Outputs;
 use crate::reading::Reading;
 
 /// The flags that set keys of the scene, in the order in which they are applied.
-const FLAGS: [(&str, &str); 13] = [
+const FLAGS: [(&str, &str); 14] = [
     ("--dims", "volume.dims"),
     ("--type", "volume.type"),
     ("--endian", "volume.endian"),
@@ -35,6 +35,7 @@ const FLAGS: [(&str, &str); 13] = [
     ("--size", "image.width"),
     ("--size", "image.height"),
     ("--background", "image.background"),
+    ("--window", "transfer.opacity"),
 ];
 
 /// The scene to draw, and the adapter.
@@ -91,6 +92,13 @@ fn parse_size(text: &str) -> Result<[u32; 2], String> {
     sides.map(Into::into).ok_or_else(|| "allowed: W or WxH, integers >= 1".to_owned())
 }
 
+/// Parses `LO,HI`, the first one less than the second one.
+fn parse_window(text: &str) -> Result<[f64; 2], String> {
+    let parse = |end: &str| end.trim().parse().ok().filter(|end: &f64| end.is_finite());
+    let ends = text.split_once(',').and_then(|(low, high)| parse(low).zip(parse(high)));
+    ends.filter(|(low, high)| low < high).map(Into::into).ok_or_else(|| "allowed: LO,HI, LO less than HI".to_owned())
+}
+
 /// Appearance by name: shorthand for the scene's keys, applied before --set.
 #[derive(clap::Args)]
 struct Look {
@@ -108,6 +116,10 @@ struct Look {
     /// transfer.colormap=NAME.
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
     colormap: Option<String>,
+    /// Opacities from 0 at the value LO and below to 1 at HI and above, in place of the scene's: short for --set transfer.opacity=[[LO,0],[HI,1]].
+    /// Of a MIP, the window of its brightness.
+    #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, value_parser = parse_window)]
+    window: Option<[f64; 2]>,
 }
 
 /// The layout of a raw file: shorthand for the scene's keys, applied before --set.
@@ -196,19 +208,35 @@ impl Input {
     }
 
     fn scene_of(&self, time: Option<&str>, sets: &[String]) -> Result<Scene, Failure> {
+        let is_opacity = |set: &&String| set.split_once('=').is_some_and(|(key, _)| key.trim() == "transfer.opacity");
+        if let (Some([low, high]), Some(set)) = (self.look.window, sets.iter().find(is_opacity)) {
+            let allowed = "one of the two, as both state the opacities";
+            return Err(Failure::Input(format!("--window: found {low},{high} and --set {set}, allowed: {allowed}")));
+        }
         let sets: Vec<String> = self.flags(time).chain(sets.iter().cloned()).collect();
         let scene = match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
             None if self.is_scene_file() => Scene::open_with(self.name.as_ref(), &sets, &self.options()),
             None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
         };
-        scene.map_err(|error| self.by_flag(&error))
+        let scene = scene.map_err(|error| self.by_flag(&error))?;
+        let unfit = [Preset::Xray, Preset::Labels, Preset::Photo];
+        if let (Some([low, high]), Some(preset)) =
+            (self.look.window, scene.transfer.preset.filter(|of| unfit.contains(of)))
+        {
+            let name = Preset::ALL.iter().find(|(_, of)| *of == preset).map_or("", |(name, _)| name);
+            let allowed = "another preset, as this one's opacities are no window of values";
+            return Err(Failure::Input(format!(
+                "--window: found {low},{high} and the preset {name}, allowed: {allowed}"
+            )));
+        }
+        Ok(scene)
     }
 
     /// What the flags are short for, with a time to be shown.
     fn flags(&self, time: Option<&str>) -> impl Iterator<Item = String> {
         let Self { raw: Raw { dims, r#type, endian, offset, spacing, channel, time: _, level }, look, .. } = self;
-        let Look { preset, size, background, colormap } = look;
+        let Look { preset, size, background, colormap, window } = look;
         let vector =
             |numbers: &Option<String>| numbers.as_ref().map(|text| format!("[{}]", text.replace(['x', '×'], ",")));
         let [width, height] = [0, 1].map(|side| size.map(|size| size[side].to_string()));
@@ -226,6 +254,7 @@ impl Input {
             width,
             height,
             background.clone(),
+            window.map(|[low, high]| format!("[[{low:?}, 0], [{high:?}, 1]]")),
         ];
         FLAGS.iter().zip(texts).filter_map(|((_, key), text)| Some(format!("{key}={}", text?)))
     }

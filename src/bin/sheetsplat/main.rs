@@ -15,6 +15,7 @@ mod index;
 mod info;
 mod interrupt;
 mod logging;
+mod look;
 mod memory;
 mod orbit;
 mod outputs;

@@ -10,6 +10,7 @@ use sheetsplat::scene::{OpenVolume, Scene};
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
 use crate::failure::Failure;
+use crate::look;
 use crate::memory::peak_rss_mib;
 use crate::outputs::{self, Outputs};
 use crate::parts::Part;
@@ -61,6 +62,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let scene = input.choose_levels(&scene, Scene::explicit)?;
     let volume = input.open_volume(&scene, &outputs)?;
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
+    look::tell_choices(progress, &input.name, &scene, volume.sample());
     let start = Instant::now();
     let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;

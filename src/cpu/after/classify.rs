@@ -8,6 +8,7 @@ use super::cells::Bits;
 use super::frame::Frame;
 use super::planes::Plane;
 use super::sheet::SlabSheet;
+use super::slab_integral::Means;
 use crate::cpu::count::bits;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::cut::TileRays;
@@ -119,7 +120,7 @@ impl Frame<'_> {
 
     /// For which of eight pixels values between those on a slab's two planes may have an opacity.
     #[inline(always)]
-    fn showing<S: Simd>(&self, simd: S, lanes: u32, planes: &mut [Plane; 2], at: [usize; 2]) -> u32 {
+    pub(super) fn showing<S: Simd>(&self, simd: S, lanes: u32, planes: &mut [Plane; 2], at: [usize; 2]) -> u32 {
         if lanes == 0 {
             return 0;
         }
@@ -192,7 +193,7 @@ impl Frame<'_> {
 
     /// The field of eight pixels in a slab; `None` if none of its values has an opacity.
     #[inline(always)]
-    fn slab<S: Simd>(
+    pub(super) fn slab<S: Simd>(
         &self,
         simd: S,
         number: i32,
@@ -241,6 +242,22 @@ impl Frame<'_> {
         ]
     }
 
+    /// The means of eight pixels in a slab, and the labels there.
+    #[inline(always)]
+    pub(super) fn means<S: Simd>(
+        &self,
+        simd: S,
+        slab: &Slab<S>,
+        looks: &Looks<'_>,
+        [column, row]: [usize; 2],
+    ) -> (Means<S>, impl Fn(usize) -> Option<u16>) {
+        let at = [looks.origin[0] + column, looks.origin[1] + row];
+        let middles = self.labels.then(|| looks.middles(slab.number, [column, row]));
+        let label = move |lane: usize| middles.and_then(|middles| self.label(at, lane, middles[lane]));
+        let table_of = self.labels.then_some(|lane| self.integrals.table(label(lane)));
+        (self.integrals.means(simd, slab.lanes, slab.values, table_of), label)
+    }
+
     /// What a slab adds to eight pixels, by channel; `None` if none of them shows anything.
     #[inline(always)]
     fn amounts<S: Simd>(
@@ -251,16 +268,12 @@ impl Frame<'_> {
         planes: &mut [Plane; 2],
         [column, row]: [usize; 2],
     ) -> Option<[f32x8<S>; CHANNELS]> {
-        let at = [looks.origin[0] + column, looks.origin[1] + row];
-        let middles = self.labels.then(|| looks.middles(slab.number, [column, row]));
-        let label = |lane: usize| middles.and_then(|middles| self.label(at, lane, middles[lane]));
-        let table_of = self.labels.then_some(|lane| self.integrals.table(label(lane)));
-        let means = self.integrals.means(simd, slab.lanes, slab.values, table_of);
-        let zero = f32x8::splat(simd, 0.0);
-        let visible = slab.lanes & means.amount.simd_gt(zero).to_bitmask() as u32;
+        let (means, label) = self.means(simd, slab, looks, [column, row]);
+        let visible = means.visible(simd, slab.lanes);
         if visible == 0 {
             return None;
         }
+        let zero = f32x8::splat(simd, 0.0);
         let (mut amount, mut color) = (means.amount, means.color);
         if let Some([red, green, blue, alpha]) = self.slab_colors(simd, slab, visible, planes, [column, row]) {
             (amount, color) = (amount * alpha, [red, green, blue]);

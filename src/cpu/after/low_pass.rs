@@ -13,7 +13,12 @@ pub(super) struct LowPass {
     pub(super) half_box: DVec3,
     /// Whether no pixel is larger than a grid unit.
     pub(super) is_identity: bool,
+    /// Whether kernels reach so many voxels that pixels are worth a task each.
+    pub(super) is_wide: bool,
 }
+
+/// The area of a pixel in voxels from which on kernels are wide: a task costs about as much as a few hundred voxels.
+const WIDE: f64 = 4.0;
 
 impl LowPass {
     /// The rule for the plane at a depth from the eye, which is 1 without an eye.
@@ -23,6 +28,11 @@ impl LowPass {
         for (axis, size) in geometry.axes.into_iter().zip(sizes.to_array()) {
             lowered -= DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z) * (1.0 - 1.0 / size);
         }
-        Self { lowered, half_box: geometry.half_box(from_eye), is_identity: sizes == DVec2::ONE }
+        Self {
+            lowered,
+            half_box: geometry.half_box(from_eye),
+            is_identity: sizes == DVec2::ONE,
+            is_wide: sizes.element_product() >= WIDE,
+        }
     }
 }

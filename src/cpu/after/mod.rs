@@ -29,6 +29,7 @@ mod sheet;
 mod slab_integral;
 mod surface;
 mod tile;
+mod wide;
 
 pub(super) use coefficients::Coefficients;
 pub(super) use frame::Frame;

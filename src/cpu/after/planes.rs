@@ -143,6 +143,11 @@ impl Plane {
         self.weights.clear();
     }
 
+    /// Whether kernels are wide ([`LowPass::is_wide`]).
+    pub(super) fn is_wide(&self) -> bool {
+        self.points.as_ref().is_some_and(|(_, low_pass)| low_pass.is_wide)
+    }
+
     /// Makes this plane another one.
     pub(super) fn become_plane(&mut self, number: i32, points: Option<(Points, LowPass)>) {
         (self.number, self.points) = (number, points);

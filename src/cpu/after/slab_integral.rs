@@ -66,6 +66,14 @@ pub(super) struct Means<S: Simd> {
     pub(super) color: [f32x8<S>; 3],
 }
 
+impl<S: Simd> Means<S> {
+    /// Which of the lanes that have a bit show anything.
+    #[inline(always)]
+    pub(super) fn visible(&self, simd: S, lanes: u32) -> u32 {
+        lanes & self.amount.simd_gt(f32x8::splat(simd, 0.0)).to_bitmask() as u32
+    }
+}
+
 /// A cell of a table.
 type Cell = [[f32; 4]; CELL];
 

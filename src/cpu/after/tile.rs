@@ -228,6 +228,7 @@ impl<'a> TileWalk<'a> {
             if is_choice(frame.compositing) {
                 frame.choose(simd, &looks, planes, &wanted, chosen);
             } else {
+                frame.find_wide(simd, slab, &looks, planes, &wanted);
                 frame.classify(simd, slab, &looks, planes, &wanted, open, (sheet, buffers));
             }
         }

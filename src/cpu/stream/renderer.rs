@@ -278,5 +278,7 @@ fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFun
     scene.check_volume(sample)?;
     check(scene)?;
     scene.check_streamed(volume)?;
-    Ok((scene.settled(sample), scene.resolve(sample)))
+    let scene = scene.settled(sample);
+    let transfer = scene.resolve(sample);
+    Ok((scene, transfer))
 }

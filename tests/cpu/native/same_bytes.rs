@@ -103,6 +103,24 @@ fn threads_change_no_bit() {
     }
 }
 
+/// A picture of one tile, whose pixels are larger than voxels.
+#[test]
+fn threads_change_no_bit_of_a_small_picture() {
+    let (volume, mut scene) = head();
+    (scene.image.width, scene.image.height) = (9, 7);
+    scene.splatting.classification = Classification::After;
+    let pools = THREADS.map(|count| rayon::ThreadPoolBuilder::new().num_threads(count).build().unwrap());
+    for compositing in [Compositing::Linear, Compositing::Surface, Compositing::Average] {
+        scene.splatting.compositing = compositing;
+        let mut renderer = CpuRenderer::new(volume.clone(), &scene).unwrap();
+        let [one, more @ ..] = pools.each_ref().map(|pool| pool.install(|| drawn(&mut renderer)));
+        assert!(one.0.iter().any(|bits| *bits != one.0[0]), "something shows");
+        for (threads, other) in THREADS[1..].iter().zip(&more) {
+            assert!(*other == one, "{threads} threads differ from one: {compositing:?}");
+        }
+    }
+}
+
 #[test]
 fn instruction_sets_change_no_bit() {
     let levels = Simd::available();

@@ -1,12 +1,13 @@
 //! Scene files, `--set` overrides and their errors; transfer functions, stated and chosen.
 
 mod classification;
+mod fitting;
 mod refusals;
 
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use sheetsplat::scene::{ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
+use sheetsplat::scene::{Fitting, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::settings::{
     Camera, Classification, Clip, Compositing, Economies, Fit, FootprintBox, FootprintForm, Gradient, Interpolation,
     LabelTables, Light, Method, Order, Projection, Ramp, Rasterizer, Shading, Splatting,
@@ -210,6 +211,7 @@ fn every_key() {
             footprint_box: FootprintBox::Parallelogram,
             experimental: Economies { whole_below: 0.25, beta: 0.75, resolution: 0.001 },
         },
+        fitting: Fitting::NONE,
     };
     assert_eq!(scene, expected);
 

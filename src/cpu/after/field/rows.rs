@@ -15,6 +15,9 @@ use crate::volume::ValueSlice;
 /// Slack around the ends of rows for rounding in f64, in voxels: every voxel is tested again.
 const SLACK: f64 = 1e-6;
 
+/// By how much |δ|² exceeds the radius' square along a row that is left out: more than f32 rounds.
+const BEYOND: f64 = 1e-3;
+
 /// Voxels of a row that a point's kernel may reach.
 #[derive(Clone, Copy, Debug)]
 struct Row {
@@ -66,16 +69,21 @@ impl Field<'_> {
                 }
                 let zero = f32x8::splat(simd, 0.0);
                 let (mut weights, mut sum) = (zero, zero);
-                for row in self.rows(at, low_pass) {
-                    for from in row.eights() {
-                        let lanes = row.lanes(simd, self, from);
-                        let c = load(simd, self.coefficients, row.index + from);
-                        let is_present = c.simd_eq(c);
-                        let weight = is_present.select(lanes, zero);
-                        weights += weight;
-                        sum += weight * is_present.select((c - self.base) * self.scale, zero);
-                    }
-                }
+                self.each_row(
+                    at,
+                    low_pass,
+                    #[inline(always)]
+                    |row| {
+                        for from in row.eights() {
+                            let lanes = row.lanes(simd, self, from);
+                            let c = load(simd, self.coefficients, row.index + from);
+                            let is_present = c.simd_eq(c);
+                            let weight = is_present.select(lanes, zero);
+                            weights += weight;
+                            sum += weight * is_present.select((c - self.base) * self.scale, zero);
+                        }
+                    },
+                );
                 let weight = sum_of(weights);
                 if weight >= MIN_WEIGHT { sum_of(sum) / weight } else { f32::NAN }
             },
@@ -90,18 +98,23 @@ impl Field<'_> {
             #[inline(always)]
             || {
                 let (mut weights, mut sums) = (0.0, f32x4::splat(simd, 0.0));
-                for row in self.rows(at, low_pass) {
-                    for from in row.eights() {
-                        let of_lanes = row.lanes(simd, self, from).to_array();
-                        let voxels = row.index + from..row.index + row.count;
-                        for (index, weight) in voxels.zip(of_lanes) {
-                            if weight > 0.0 && !self.coefficients.at(index).is_nan() {
-                                weights += weight;
-                                sums += f32x4::load_array(simd, colors.at(index)) * weight;
+                self.each_row(
+                    at,
+                    low_pass,
+                    #[inline(always)]
+                    |row| {
+                        for from in row.eights() {
+                            let of_lanes = row.lanes(simd, self, from).to_array();
+                            let voxels = row.index + from..row.index + row.count;
+                            for (index, weight) in voxels.zip(of_lanes) {
+                                if weight > 0.0 && !self.coefficients.at(index).is_nan() {
+                                    weights += weight;
+                                    sums += f32x4::load_array(simd, colors.at(index)) * weight;
+                                }
                             }
                         }
-                    }
-                }
+                    },
+                );
                 (sums * (1.0 / weights)).to_array().map(|number: f32| number.clamp(0.0, 1.0))
             },
         )
@@ -118,24 +131,29 @@ impl Field<'_> {
                 let near = self.nearest_voxel(at);
                 let nearest = self.coefficients.at(self.extent.index(near));
                 let (mut weights, mut sum, mut moments, mut offsets) = (zero, zero, [zero; 3], [zero; 3]);
-                for row in self.rows(at, low_pass) {
-                    let to_first = low_pass.lowered * (near.as_dvec3() - row.first.as_dvec3());
-                    let to_first = to_first.to_array().map(|component| component as f32);
-                    for from in row.eights() {
-                        let c = load(simd, self.coefficients, row.index + from);
-                        let is_present = c.simd_eq(c);
-                        let weight = is_present.select(row.lanes(simd, self, from), zero);
-                        let weighted = weight * is_present.select((c - nearest) * self.scale, zero);
-                        let number = iota(simd) + from as f32;
-                        weights += weight;
-                        sum += weighted;
-                        for axis in 0..3 {
-                            let offset = number * row.step[axis] + to_first[axis];
-                            moments[axis] += weighted * offset;
-                            offsets[axis] += weight * offset;
+                self.each_row(
+                    at,
+                    low_pass,
+                    #[inline(always)]
+                    |row| {
+                        let to_first = low_pass.lowered * (near.as_dvec3() - row.first.as_dvec3());
+                        let to_first = to_first.to_array().map(|component| component as f32);
+                        for from in row.eights() {
+                            let c = load(simd, self.coefficients, row.index + from);
+                            let is_present = c.simd_eq(c);
+                            let weight = is_present.select(row.lanes(simd, self, from), zero);
+                            let weighted = weight * is_present.select((c - nearest) * self.scale, zero);
+                            let number = iota(simd) + from as f32;
+                            weights += weight;
+                            sum += weighted;
+                            for axis in 0..3 {
+                                let offset = number * row.step[axis] + to_first[axis];
+                                moments[axis] += weighted * offset;
+                                offsets[axis] += weight * offset;
+                            }
                         }
-                    }
-                }
+                    },
+                );
                 let per_weight = 1.0 / sum_of(weights);
                 let mean = sum_of(sum) * per_weight;
                 [0, 1, 2].map(|axis: usize| (sum_of(moments[axis]) - mean * sum_of(offsets[axis])) * per_weight)
@@ -151,15 +169,20 @@ impl Field<'_> {
             || {
                 let zero = f32x8::splat(simd, 0.0);
                 let mut sums = Sums { weights: zero, sums: [zero; 3] };
-                for row in self.rows(at, low_pass) {
-                    for from in row.eights() {
-                        let lanes = row.lanes(simd, self, from);
-                        let c = load(simd, self.coefficients, row.index + from);
-                        let weight = c.simd_eq(c).select(lanes, zero);
-                        let differences = self.differences(simd, &row, from, weight);
-                        sums.add(weight, differences);
-                    }
-                }
+                self.each_row(
+                    at,
+                    low_pass,
+                    #[inline(always)]
+                    |row| {
+                        for from in row.eights() {
+                            let lanes = row.lanes(simd, self, from);
+                            let c = load(simd, self.coefficients, row.index + from);
+                            let weight = c.simd_eq(c).select(lanes, zero);
+                            let differences = self.differences(simd, &row, from, weight);
+                            sums.add(weight, differences);
+                        }
+                    },
+                );
                 let [x, y, z] = sums.means();
                 let [per_x, per_y, per_z] = self.per_spacing;
                 [x * per_x, y * per_y, z * per_z]
@@ -205,29 +228,39 @@ impl Field<'_> {
         [f32x8::load_array_ref(simd, x), f32x8::load_array_ref(simd, y), f32x8::load_array_ref(simd, z)]
     }
 
-    /// The rows whose voxels may be within the radius.
-    fn rows(&self, at: DVec3, low_pass: &LowPass) -> impl Iterator<Item = Row> {
+    /// Calls a function with each row whose voxels may be within the radius.
+    // A loop, because the closures of iterators would not be compiled for the instruction set.
+    #[inline(always)]
+    fn each_row(&self, at: DVec3, low_pass: &LowPass, mut then: impl FnMut(Row)) {
         let (extent, radius) = (self.extent, self.radius);
         let dims = extent.dims;
         let low = (at - low_pass.half_box).ceil().max(DVec3::ZERO).as_uvec3();
         let end = ((at + low_pass.half_box).floor() + 1.0).clamp(DVec3::ZERO, dims.as_dvec3()).as_uvec3();
         let (lowered, step) = (low_pass.lowered, -low_pass.lowered.x_axis);
-        let rows = (low.z..end.z).flat_map(move |z| (low.y..end.y).map(move |y| (y, z)));
-        rows.filter_map(move |(y, z)| {
-            // |δ| is less than the radius between the roots of a quadratic function of x.
-            let offset = lowered * (at - DVec3::new(0.0, y.into(), z.into()));
-            let (a, b) = (step.length_squared(), offset.dot(step));
-            let root = (b * b - a * (offset.length_squared() - radius * radius)).max(0.0).sqrt();
-            let first = (((-b - root) / a - SLACK).ceil().max(0.0) as u32).max(low.x);
-            let end = (((-b + root) / a + SLACK).floor() + 1.0).clamp(0.0, f64::from(end.x)) as u32;
-            (first < end).then(|| Row {
-                first: UVec3::new(first, y, z),
-                index: extent.index(UVec3::new(first, y, z)),
-                count: (end - first) as usize,
-                offset: (offset + step * f64::from(first)).to_array().map(|component| component as f32),
-                step: step.to_array().map(|component| component as f32),
-            })
-        })
+        for z in low.z..end.z {
+            for y in low.y..end.y {
+                // |δ| is less than the radius between the roots of a quadratic function of x.
+                let offset = lowered * (at - DVec3::new(0.0, y.into(), z.into()));
+                let (a, b) = (step.length_squared(), offset.dot(step));
+                let discriminant = b * b - a * (offset.length_squared() - radius * radius);
+                // Most rows of the box around a kernel that is wide along two directions, and narrow along the third, are far from it.
+                if discriminant < -BEYOND * a {
+                    continue;
+                }
+                let root = discriminant.max(0.0).sqrt();
+                let first = (((-b - root) / a - SLACK).ceil().max(0.0) as u32).max(low.x);
+                let end = (((-b + root) / a + SLACK).floor() + 1.0).clamp(0.0, f64::from(end.x)) as u32;
+                if first < end {
+                    then(Row {
+                        first: UVec3::new(first, y, z),
+                        index: extent.index(UVec3::new(first, y, z)),
+                        count: (end - first) as usize,
+                        offset: (offset + step * f64::from(first)).to_array().map(|component| component as f32),
+                        step: step.to_array().map(|component| component as f32),
+                    });
+                }
+            }
+        }
     }
 
     /// The voxel nearest to a point.
