@@ -55,6 +55,15 @@ const SLICES: [&str; 2] = ["TIFF", DICOM];
 
 fn formats<T: Voxel>() -> Vec<Format<T>> {
     vec![
+        // The preamble before `DICM` may be the beginning of any other file, often of a TIFF (PS3.10 7.1), so that this format comes first. The group of
+        // the element after it tells it from another format's text.
+        Format {
+            name: DICOM,
+            extensions: &[".dcm"],
+            is_magic: |head| head.get(128..134) == Some(b"DICM\x02\0"),
+            read: reader!("dicom", super::dicom::read),
+            read_folder: reader!("dicom", super::dicom::read_folder).ok(),
+        },
         Format {
             name: "NRRD",
             extensions: &[".nrrd", ".nhdr"],
@@ -65,9 +74,13 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
         Format {
             name: "NIfTI",
             extensions: &[".nii", ".nii.gz", ".hdr", ".img", ".hdr.gz", ".img.gz"],
+            // Other files may hold the magic, which is not at their beginning, among their data.
             is_magic: |head| {
-                matches!(head.get(344..348), Some(b"n+1\0" | b"ni1\0"))
-                    || matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
+                let [size, swapped] =
+                    head.first_chunk().map_or([0; 2], |&size| [u32::from_le_bytes(size), u32::from_be_bytes(size)]);
+                let is_sized = |bytes: u32| size == bytes || swapped == bytes;
+                is_sized(348) && matches!(head.get(344..348), Some(b"n+1\0" | b"ni1\0"))
+                    || is_sized(540) && matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
             },
             read: reader!("nifti", super::nifti::read),
             read_folder: None,
@@ -117,16 +130,13 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: reader!("tiff", super::tiff::read_folder).ok(),
         },
         Format {
-            name: DICOM,
-            extensions: &[".dcm"],
-            is_magic: |head| head.get(128..132) == Some(b"DICM"),
-            read: reader!("dicom", super::dicom::read),
-            read_folder: reader!("dicom", super::dicom::read_folder).ok(),
-        },
-        Format {
             name: "VTI",
             extensions: &[".vti"],
-            is_magic: |head| head.windows(8).any(|window| window == b"<VTKFile"),
+            // Other texts may hold the element's name, too.
+            is_magic: |head| {
+                let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+                text.starts_with(b"<") && text.windows(8).any(|window| window == b"<VTKFile")
+            },
             read: reader!("vtk", super::vtk::read_image_data),
             read_folder: None,
         },

@@ -136,6 +136,8 @@ struct Header {
     is_sequence: bool,
     /// Whether its value may be a sequence whose elements have no explicit types.
     is_unknown: bool,
+    /// Whether its value, if its length is undefined, consists of fragments, not of items with elements.
+    has_fragments: bool,
     in_words: bool,
     length: u32,
 }
@@ -159,7 +161,9 @@ impl Parser {
         let [a, b, c, d] = self.begun.take().map_or_else(|| self.bytes.take(), Ok)?;
         let tag = if self.big_endian { [a, b, c, d] } else { [b, a, d, c] };
         let tag = Tag::from_be_bytes(tag);
-        let mut header = Header { tag, is_sequence: false, is_unknown: false, in_words: false, length: 0 };
+        let has_fragments = PIXELS.contains(&tag);
+        let mut header =
+            Header { tag, is_sequence: false, is_unknown: false, has_fragments, in_words: false, length: 0 };
         if self.implicit || matches!(tag, ITEM | ITEM_END | SEQUENCE_END) {
             header.is_sequence = SEQUENCES.contains(&tag);
             header.in_words = true;
@@ -174,6 +178,7 @@ impl Parser {
         header.is_sequence = kind == *b"SQ";
         header.is_unknown = kind == *b"UN";
         header.in_words = kind == *b"OW";
+        header.has_fragments |= kind[0] == b'O';
         let is_long = [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT", b"UV"];
         header.length = if is_long.contains(&&kind) {
             self.bytes.take::<2>()?;
@@ -204,7 +209,10 @@ impl Parser {
                 self.pixels = Some((header.tag, self.pixels(&header)?));
                 break;
             }
-            if header.length == UNDEFINED || header.is_sequence {
+            if header.length == UNDEFINED && header.has_fragments {
+                // Those of an icon, say, or of a private element.
+                self.pixels(&header)?;
+            } else if header.length == UNDEFINED || header.is_sequence {
                 self.sequence(&header, end, depth, &mut data)?;
             } else {
                 self.value(&header, end, &mut data)?;

@@ -52,6 +52,16 @@ fn frames_of_pydicom() {
     }
 }
 
+/// Slices that are TIFF files, too, and slices with icons whose pixels are compressed, also in private sequences (`pydicom.dcmread(…).pixel_array`).
+#[test]
+fn slices_with_something_else_in_them() {
+    for name in ["dicom/preambles", "dicom/icons"] {
+        let volume = open(name);
+        assert_lies_as_written(&volume);
+        assert_eq!(volume.encoding().unwrap().format, "DICOM", "{name}");
+    }
+}
+
 #[test]
 fn one_slice_is_as_thick_as_it_says() {
     let volume = Volume::open(&fixture("series/IM2")).unwrap();
