@@ -12,7 +12,15 @@ use super::super::head::is_bare_dicom;
 use super::bytes::Bytes;
 use super::dataset::{Dataset, Tag, name, shown_tag, tags};
 
-const SEQUENCES: [Tag; 6] = [
+const SEQUENCES: [Tag; 14] = [
+    tags::GRADIENTS,
+    tags::ECHO,
+    tags::DIFFUSION,
+    tags::CARDIAC,
+    tags::MR_FRAME_TYPE,
+    tags::FRAME_CONTENT,
+    tags::MODALITY_LUT,
+    tags::DETECTORS,
     tags::PLANE_POSITION,
     tags::PLANE_ORIENTATION,
     tags::PIXEL_MEASURES,
@@ -35,8 +43,8 @@ const UNDEFINED: u32 = u32::MAX;
 const MAX_DEPTH: u32 = 32;
 /// The maximum number of items kept in all sequences: a few for every frame.
 const MAX_ITEMS: u32 = 1 << 20;
-/// The maximum size in bytes of a value that is kept.
-const MAX_VALUE: u32 = 1 << 12;
+/// The maximum size in bytes of a value that is kept: a table of 65536 numbers of 16 bits.
+const MAX_VALUE: u32 = 1 << 17;
 
 /// A file's elements, and the place of its pixels.
 pub(super) struct Elements {
