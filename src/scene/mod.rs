@@ -269,7 +269,7 @@ impl Scene {
             ..Splatting::default()
         };
         let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
-        let Channel { name, visible, volume, spacing, labels, index, time, level, transfer } =
+        let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } =
             channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
         let scene = Self {
             volume,
@@ -278,6 +278,7 @@ impl Scene {
             index,
             time,
             level,
+            series,
             name,
             visible,
             camera: tables::camera(camera, camera_by_default)?,

@@ -50,6 +50,9 @@ const ZARR: &str = "Zarr";
 /// Formats whose files, if they are uncompressed, are read by boxes.
 const SEEKABLE: [&str; 4] = ["NRRD", "NIfTI", "MetaImage", "NPY"];
 
+/// What volumes allow that are not of a format with several series.
+const NO_SERIES: &str = "no series, which only DICOM has";
+
 /// Formats with one slice per file of a folder.
 const SLICES: [&str; 2] = ["TIFF", DICOM];
 
@@ -160,6 +163,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     {
         return Err(invalid(path, "level", level, "0, the only one"));
     }
+    if let Some(series) = access.series().filter(|_| format.is_some_and(|of| of.name != DICOM)) {
+        return Err(invalid(path, "series", series, NO_SERIES));
+    }
     let found = match format {
         None if access.is_folder(file)? => return read_folder(path, access, &formats),
         Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path, access)?)),
@@ -184,7 +190,11 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
 /// Opens the selected channels of a file that is read by boxes.
 pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
     let formats = formats::<f32>();
-    let found = match format_at(&formats, path, access)? {
+    let format = format_at(&formats, path, access)?;
+    if let Some(series) = access.series().filter(|_| format.is_some_and(|of| of.name != DICOM)) {
+        return Err(invalid(path, "series", series, NO_SERIES));
+    }
+    let found = match format {
         #[cfg(feature = "zarr")]
         Some(Format { name: ZARR, .. }) => return super::zarr::open(path, ZARR, access),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
@@ -291,7 +301,12 @@ fn read_folder<T: Voxel>(
     }
     let found = match slices.as_slice() {
         [] => format!("{count} files, no slices among them"),
-        [(Format { name, read_folder: Some(read), .. }, files)] => return Ok((name, read(path, files, access)?)),
+        [(Format { name, read_folder: Some(read), .. }, files)] => {
+            if let Some(series) = access.series().filter(|_| *name != DICOM) {
+                return Err(invalid(path, "series", series, NO_SERIES));
+            }
+            return Ok((name, read(path, files, access)?));
+        }
         [(Format { name, read: Err(feature), .. }, _)] => needs(name, feature),
         several => {
             let counts = several.iter().map(|(Format { name, .. }, files)| format!("{} {name} files", files.len()));

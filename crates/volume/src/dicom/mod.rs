@@ -149,8 +149,6 @@ fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Lo
     }
     let palette = first.palette.clone().filter(|_| is_shared && !is_rescaled);
     let Stacks { channels: channel_names, times: time_names, .. } = stacks;
-    let chosen = several.channels(selection).start as usize;
-    let channel_names = channel_names.into_iter().skip(chosen).collect();
     let loaded = Loaded {
         spacing: Some(lattice.spacing),
         unit,

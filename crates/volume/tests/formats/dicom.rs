@@ -1,6 +1,8 @@
 //! DICOM as pydicom writes it, and invalid series.
 
-use sheetsplat_volume::{Encoding, Labels, SampleType};
+mod several;
+
+use sheetsplat_volume::{Encoding, Labels, ReadOptions, SampleType};
 
 use crate::*;
 
@@ -161,13 +163,17 @@ impl Slice {
 
 /// Opens a folder with some slices, which are named `0`, `1`, …
 fn series(slices: &[Slice]) -> Result<Volume, VolumeError> {
+    series_with(slices, &ReadOptions::default())
+}
+
+fn series_with(slices: &[Slice], options: &ReadOptions) -> Result<Volume, VolumeError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("series");
     fs::create_dir(&path).unwrap();
     for (number, slice) in slices.iter().enumerate() {
         fs::write(path.join(number.to_string()), slice.bytes()).unwrap();
     }
-    Volume::open(&path)
+    Volume::open_with(&path, options)
 }
 
 fn at(places: &[f64]) -> Vec<Slice> {
