@@ -33,7 +33,7 @@ impl Even {
         let finest = alike.iter().sum::<f64>() / alike.len() as f64;
         let (first, last) = (positions[0], positions[positions.len() - 1]);
         let count = ((last - first) / finest).round();
-        if !(count + 1.0 <= MAX_GROWTH * positions.len() as f64) {
+        if count.is_nan() || count + 1.0 > MAX_GROWTH * positions.len() as f64 {
             return Err(format!("distances from {least:.4} to {most:.4}, which need {} samples", count + 1.0));
         }
         let step = (last - first) / count;
