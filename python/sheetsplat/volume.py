@@ -197,12 +197,13 @@ def _open(
         None if number is None else whole(key, number, 0, 2**32 - 1, VolumeError)
         for key, number in zip(("channel", "time", "level"), selection, strict=True)
     ]
-    chosen = series if series is None or isinstance(series, str) else str(whole("series", series, 0, 2**32 - 1, VolumeError))
+    if series is not None and not isinstance(series, str):
+        series = str(whole("series", series, 0, 2**32 - 1, VolumeError))
     tags = sources.labels_of(labels, None, limit)
     if name.startswith(_BUILTIN):
         progress = False
     with loading(name, progress) as bytes_read:
-        return native.Volume.open(name, limit, selection, scene, bytes_read, (spacing, tags), index, chosen)
+        return native.Volume.open(name, limit, selection, scene, bytes_read, (spacing, tags), index, series)
 
 
 def _memory(memory: int | str | None) -> str | None:
