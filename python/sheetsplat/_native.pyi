@@ -65,6 +65,7 @@ class Volume:
         bytes_read: BytesRead | None,
         changes: tuple[tuple[float, float, float] | None, NDArray[Any] | None] | None = None,
         index: str | PathLike[str] | None = None,
+        series: str | None = None,
     ) -> Volume: ...
     def replaced(
         self,

@@ -52,6 +52,10 @@ class Volume:
         The channel, the time and the level of a path that holds several, counted from 0: all channels, the first time
         and the finest level without them. The channel and the time also of a ``DataArray`` with dims c (channel) and t (time).
 
+    series : int or str, optional
+        The series of a DICOM folder with several, by its number, counted from 0, or its ``SeriesInstanceUID``: the largest
+        without it. ``info()`` lists them.
+
     Examples
     --------
     >>> import numpy as np
@@ -76,12 +80,15 @@ class Volume:
         time: int | None = None,
         level: int | None = None,
         index: str | os.PathLike[str] | None = None,
+        series: int | str | None = None,
     ) -> None:
         steps = None if spacing is None else _spacing(spacing)
         limit = _memory(memory)
         if channel_axis is None and isinstance(source, (str, os.PathLike)):
-            self._native = _open(source, memory, progress, [channel, time, level], None, steps, labels, index)
+            self._native = _open(source, memory, progress, [channel, time, level], None, steps, labels, index, series)
             return
+        if series is not None:
+            raise volume_refused("series", repr(series), "nothing, where the source is no path")
         if channel_axis is None and isinstance(source, Volume):
             self._native = source._native
             if steps is not None or labels is not None:
@@ -183,17 +190,20 @@ def _open(
     spacing: tuple[float, float, float] | None = None,
     labels: Any = None,
     index: str | os.PathLike[str] | None = None,
+    series: int | str | None = None,
 ) -> native.Volume:
     name, limit = os.fsdecode(path), _memory(memory)
     selection = [
         None if number is None else whole(key, number, 0, 2**32 - 1, VolumeError)
         for key, number in zip(("channel", "time", "level"), selection, strict=True)
     ]
+    if series is not None and not isinstance(series, str):
+        series = str(whole("series", series, 0, 2**32 - 1, VolumeError))
     tags = sources.labels_of(labels, None, limit)
     if name.startswith(_BUILTIN):
         progress = False
     with loading(name, progress) as bytes_read:
-        return native.Volume.open(name, limit, selection, scene, bytes_read, (spacing, tags), index)
+        return native.Volume.open(name, limit, selection, scene, bytes_read, (spacing, tags), index, series)
 
 
 def _memory(memory: int | str | None) -> str | None:

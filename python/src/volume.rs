@@ -155,7 +155,7 @@ impl Volume {
     /// A volume file, a folder of slices, or `builtin:NAME`: the channel, the time and the level that `selection` states. The scene in which it will be shown
     /// chooses a level that is left open, or the finest is taken. The spacing, in the order z, y, x, and the labels of an array go before the file's.
     #[staticmethod]
-    #[pyo3(signature = (path, memory, selection, scene, bytes_read, changes=None, index=None))]
+    #[pyo3(signature = (path, memory, selection, scene, bytes_read, changes=None, index=None, series=None))]
     #[expect(clippy::too_many_arguments, reason = "the package's Python part passes its own")]
     fn open(
         py: Python<'_>,
@@ -166,6 +166,7 @@ impl Volume {
         bytes_read: Option<&BytesRead>,
         changes: Option<Changes<'_>>,
         index: Option<PathBuf>,
+        series: Option<String>,
     ) -> PyResult<Self> {
         let inputs = Inputs::default();
         let mut options = reading(memory, index, bytes_read)?.noted_in(&inputs);
@@ -181,6 +182,7 @@ impl Volume {
             None => sheetsplat::Scene::from_volume(source, &[]).map_err(Raised::from)?,
         };
         [shown.index, shown.time, shown.level] = selection;
+        shown.series = series;
         (shown.spacing, shown.labels) = (None, None);
         if scene.is_none() && builtin.is_none() {
             shown.level = shown.level.or(Some(0));
@@ -291,6 +293,9 @@ impl Volume {
         info.set_item("unit", volume.unit())?;
         info.set_item("format", volume.encoding().map(|encoding| encoding.format))?;
         info.set_item("type", volume.encoding().map(|encoding| encoding.sample_type.to_string()))?;
+        info.set_item("times", volume.encoding().map_or(1, |encoding| encoding.times))?;
+        info.set_item("time_names", volume.time_names().to_vec())?;
+        info.set_item("series", volume.series_names().to_vec())?;
         info.set_item("holes", volume.holes())?;
         info.set_item("min", min)?;
         info.set_item("max", max)?;

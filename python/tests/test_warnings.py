@@ -2,6 +2,7 @@
 
 import logging
 import pathlib
+import shutil
 import warnings
 from collections.abc import Callable
 from typing import Any
@@ -116,3 +117,21 @@ def test_control_characters_of_files_are_escaped(tmp_path: pathlib.Path) -> None
     with pytest.warns(SheetsplatWarning) as caught:
         Volume(path)
     assert all("\x1b" not in str(warning.message) for warning in caught)
+
+
+def test_a_series_of_a_folder_is_chosen(tmp_path: pathlib.Path) -> None:
+    fixtures = pathlib.Path(__file__).parents[2] / "tests" / "fixtures"
+    for name in ("series/IM1", "series/IM2", "series/IM3.dcm", "jpeg2000-large.dcm"):
+        shutil.copy(fixtures / name, tmp_path)
+    with pytest.warns(SheetsplatWarning, match="2 series: 0: 3 of 5 × 4"):
+        assert Volume(tmp_path).shape == (3, 4, 5)
+    for series in (1, "1"):
+        chosen = Volume(tmp_path, series=series)
+        assert chosen.shape == (1, 50, 70)
+        assert len(chosen.info()["series"]) == 2
+    assert Volume(tmp_path, series="1.2.4").shape == (3, 4, 5)
+    for wrong in (2, -1, "1.2"):
+        with pytest.raises(sheetsplat.VolumeError, match="series"):
+            Volume(tmp_path, series=wrong)
+    with pytest.raises(sheetsplat.VolumeError, match="series"):
+        Volume(VALUES, series=0)

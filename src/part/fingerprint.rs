@@ -75,11 +75,11 @@ fn bits(value: f32) -> u32 {
 fn settings(mut scene: Scene) -> Result<String, SceneError> {
     scene.volume = VolumeSource::Memory;
     (scene.spacing, scene.labels, scene.name) = (None, None, None);
-    (scene.index, scene.time, scene.level) = (None, None, None);
+    (scene.index, scene.time, scene.level, scene.series) = (None, None, None, None);
     for channel in &mut scene.further {
         (channel.volume, channel.name) = (VolumeSource::Memory, None);
         (channel.spacing, channel.labels) = (None, None);
-        (channel.index, channel.time, channel.level) = (None, None, None);
+        (channel.index, channel.time, channel.level, channel.series) = (None, None, None, None);
     }
     scene.splatting.rasterizer = Rasterizer::Auto;
     // Tiles never change an image.

@@ -28,6 +28,8 @@ pub struct Channel {
     pub time: Option<u32>,
     /// The level, from 0 for the finest, that is read of a store with several; `None` chooses one ([`Scene::choose_levels`](super::Scene::choose_levels)).
     pub level: Option<u32>,
+    /// The series that is read of a folder with several: its number, from 0, or its `SeriesInstanceUID`; `None` reads the largest.
+    pub series: Option<String>,
     /// Colour and opacity.
     pub transfer: TransferSettings,
 }
@@ -45,6 +47,7 @@ impl Channel {
             index: None,
             time: None,
             level: None,
+            series: None,
             transfer,
         }
     }

@@ -10,7 +10,7 @@ use crate::volume::Volume;
 impl Scene {
     /// The channels that the scene has settings for, the first of which are the scene's own.
     pub fn channels(&self) -> impl Iterator<Item = Cow<'_, Channel>> {
-        let Self { name, visible, volume, spacing, labels, index, time, level, transfer, .. } = self;
+        let Self { name, visible, volume, spacing, labels, index, time, level, series, transfer, .. } = self;
         let first = Channel {
             name: name.clone(),
             visible: *visible,
@@ -20,6 +20,7 @@ impl Scene {
             index: *index,
             time: *time,
             level: *level,
+            series: series.clone(),
             transfer: transfer.clone(),
         };
         std::iter::once(Cow::Owned(first)).chain(self.further.iter().map(Cow::Borrowed))
@@ -103,9 +104,9 @@ impl Scene {
         let kept = self.channels().enumerate().filter(|(number, _)| numbers.contains(number));
         let mut kept = kept.map(|(_, channel)| channel.into_owned());
         let Some(first) = kept.next() else { return self.clone() };
-        let Channel { name, visible, volume, spacing, labels, index, time, level, transfer } = first;
+        let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } = first;
         let further = kept.collect();
-        Self { name, visible, volume, spacing, labels, index, time, level, transfer, further, ..self.clone() }
+        Self { name, visible, volume, spacing, labels, index, time, level, series, transfer, further, ..self.clone() }
     }
 
     /// The name of a channel of a volume: the scene's, the file's, or `channel N`, counted from 0.

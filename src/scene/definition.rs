@@ -15,7 +15,7 @@ use crate::settings::splatting::{Classification, Splatting};
 /// The readers below accept `--set` overrides, each `table.key=value` (or `table={…}` for a whole table), applied in order over the
 /// file's values. The value is TOML, or a string if it does not parse as TOML. An override of `volume.path` also removes
 /// `volume.builtin`; one of `volume.builtin` removes `volume.path` and the layout of a raw file. Where a scene file has tables `[[channel]]`, keys of `volume`
-/// are those of the first channel, and `volume.time`, `level` and `spacing` also those of all channels that name its file. `volume.index` leaves one
+/// are those of the first channel, and `volume.time`, `level`, `series` and `spacing` also those of all channels that name its file. `volume.index` leaves one
 /// of these tables if the others name no volume: that of the channel with this number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
@@ -31,6 +31,8 @@ pub struct Scene {
     pub time: Option<u32>,
     /// The level, from 0 for the finest, that is read of a store with several; `None` chooses one ([`Self::choose_levels`]).
     pub level: Option<u32>,
+    /// The series that is read of a folder with several: its number, from 0, or its `SeriesInstanceUID`; `None` reads the largest.
+    pub series: Option<String>,
     /// The name of the channel in legends and picks; `None` uses the file's.
     pub name: Option<String>,
     /// Whether the channel is drawn.
@@ -63,6 +65,7 @@ impl Scene {
             index: None,
             time: None,
             level: None,
+            series: None,
             name: None,
             visible: true,
             camera: Camera::of_object(),

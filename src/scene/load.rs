@@ -47,7 +47,9 @@ pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Sto
     if first.labels.is_some() {
         return None;
     }
-    let access = access.selecting(Selection { channel: first.index, time: first.time, level: None });
+    let access = access
+        .selecting(Selection { channel: first.index, time: first.time, level: None })
+        .of_series(first.series.as_deref());
     let store = match &first.volume {
         VolumeSource::File(path) => volume::store(path, &access),
         VolumeSource::Raw(path, layout) => raw_store(path, layout, &access),
@@ -87,7 +89,9 @@ pub(super) fn streamed(scene: &Scene, access: &Access) -> Option<Result<Streamed
 /// The selected channels of a file, the first of them with the labels of its settings.
 fn streamed_file(settings: &Channel, access: &Access) -> Result<Streamed, VolumeError> {
     let level = settings.level.unwrap_or(0);
-    let own = access.selecting(Selection { channel: settings.index, time: settings.time, level: None });
+    let own = access
+        .selecting(Selection { channel: settings.index, time: settings.time, level: None })
+        .of_series(settings.series.as_deref());
     let stores = match &settings.volume {
         VolumeSource::File(path) => volume::stores(path, &own)?,
         VolumeSource::Raw(path, layout) => vec![raw_store(path, layout, &own)?],
@@ -140,13 +144,18 @@ fn single(count: usize, number: usize, settings: &Channel) -> Result<(), VolumeE
 fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, VolumeError> {
     let selection = Selection { channel: settings.index, time: settings.time, level: settings.level };
     let volume = match &settings.volume {
-        VolumeSource::File(path) => Volume::read(path, &access.selecting(selection))?,
-        VolumeSource::Raw(..) | VolumeSource::Builtin(_) if selection != Selection::default() => {
+        VolumeSource::File(path) => {
+            Volume::read(path, &access.selecting(selection).of_series(settings.series.as_deref()))?
+        }
+        VolumeSource::Raw(..) | VolumeSource::Builtin(_)
+            if selection != Selection::default() || settings.series.is_some() =>
+        {
             return Err(VolumeError::invalid(
                 origin(&settings.volume),
                 key.to_owned(),
-                "index, time or level of a volume without channels, times or levels to choose from".to_owned(),
-                "none of these keys, or a file of several channels, times or levels".to_owned(),
+                "index, time, level or series of a volume without channels, times, levels or series to choose from"
+                    .to_owned(),
+                "none of these keys, or a file of several channels, times, levels or series".to_owned(),
             ));
         }
         VolumeSource::Raw(path, layout) => Volume::read_raw(path, layout, access)?,

@@ -295,7 +295,7 @@ impl Scene {
         let is_open = preset.is_none() && !states_transfer;
         let fitting = if is_open { tables::fitting(&shading, &splatting) } else { Fitting::NONE };
         let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
-        let Channel { name, visible, volume, spacing, labels, index, time, level, transfer } =
+        let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } =
             channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
         let scene = Self {
             volume,
@@ -304,6 +304,7 @@ impl Scene {
             index,
             time,
             level,
+            series,
             name,
             visible,
             camera: tables::camera(camera, camera_by_default)?,

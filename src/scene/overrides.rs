@@ -9,7 +9,7 @@ use super::reader::{OVERRIDE, typed};
 pub(super) const MAX_CHANNELS: usize = 64;
 
 /// The keys of `[volume]` that concern a whole file, whichever channels come from it.
-const OF_WHOLE_FILE: [&str; 3] = ["time", "level", "spacing"];
+const OF_WHOLE_FILE: [&str; 4] = ["time", "level", "series", "spacing"];
 
 /// Applies one `--set` argument, `table.key=value` or `table=value`, and returns its key. In a scene of `[[channel]]` tables, keys of `[volume]` are those
 /// of the first channel.

@@ -250,6 +250,18 @@ impl<'a> Entry<'a> {
         }
     }
 
+    /// A series, by its number or its identity.
+    pub(super) fn series(&self) -> Result<Option<String>, SceneError> {
+        let allowed = "an integer >= 0, or a SeriesInstanceUID in quotes";
+        match (self.value.as_integer(), self.value.as_str()) {
+            (Some(integer), _) => {
+                u32::try_from(integer).map(|number| Some(number.to_string())).map_err(|_| self.refused(allowed))
+            }
+            (_, Some(text)) => Ok(Some(text.to_owned())),
+            _ => Err(self.mistyped(allowed)),
+        }
+    }
+
     /// A label.
     pub(super) fn label(&self) -> Result<u16, SceneError> {
         let integer = self.value.as_integer().ok_or_else(|| self.mistyped(LABEL))?;

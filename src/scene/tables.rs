@@ -84,16 +84,21 @@ pub(super) fn channels(
     for ChannelTables { key, name, visible, volume: of_volume, transfer: of_transfer, .. } in tables {
         let origins = of_volume.origins;
         let is_first = channels.is_empty();
-        let VolumeSettings { source, spacing, labels, index, time, level } =
+        let VolumeSettings { source, spacing, labels, index, time, level, series } =
             volume(of_volume, folder, if is_first { given.take() } else { Some(VolumeSource::Memory) })?;
-        let states_more = spacing.is_some() || labels.is_some() || index.is_some() || time.is_some() || level.is_some();
+        let states_more = spacing.is_some()
+            || labels.is_some()
+            || index.is_some()
+            || time.is_some()
+            || level.is_some()
+            || series.is_some();
         if !is_first && source == VolumeSource::Memory && states_more {
             let found = "keys of a volume without path or builtin";
             let allowed = "keys of a volume of the channel's own";
             return Err(origins.invalid(&format!("{key}.volume"), &[], found, allowed));
         }
         let transfer = TransferSettings { preset, ..transfer(of_transfer)? };
-        let channel = Channel { name, visible, volume: source, spacing, labels, index, time, level, transfer };
+        let channel = Channel { name, visible, volume: source, spacing, labels, index, time, level, series, transfer };
         if !channel.transfer.labels.is_empty() && !channel.may_have_labels() {
             let key = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
             let allowed = "no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
@@ -119,6 +124,7 @@ struct VolumeSettings {
     index: Option<u32>,
     time: Option<u32>,
     level: Option<u32>,
+    series: Option<String>,
 }
 
 /// Reads `[volume]`; `given` is the source of a table that names none.
@@ -134,6 +140,8 @@ fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> R
     section.read("index", &mut index, |entry| entry.count().map(Some))?;
     section.read("time", &mut time, |entry| entry.count().map(Some))?;
     section.read("level", &mut level, Entry::level)?;
+    let mut series = None;
+    section.read("series", &mut series, Entry::series)?;
     let raw = raw_layout(&mut section)?;
     let (origins, key) = (section.origins, section.name.clone());
     section.finish()?;
@@ -155,7 +163,7 @@ fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> R
             return Err(origins.invalid(&format!("{key}.dims"), &[], found, format!("{key}.path")));
         }
     };
-    Ok(VolumeSettings { source, spacing, labels, index, time, level })
+    Ok(VolumeSettings { source, spacing, labels, index, time, level, series })
 }
 
 /// The layout of a raw file: `dims`, which requires `type`, `endian` and `offset`.

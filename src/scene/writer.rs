@@ -66,7 +66,7 @@ struct Text {
 }
 
 fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<(), SceneError> {
-    let Channel { name, visible, volume, spacing, labels, index, time, level, transfer } = channel;
+    let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } = channel;
     if text.channel.is_some() {
         let _ = writeln!(text.text, "\n[[channel]]");
         text.given("name", name.as_deref());
@@ -104,6 +104,7 @@ fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<()
     text.given("index", index.map(i64::from));
     text.given("time", time.map(i64::from));
     text.given("level", level.map(i64::from));
+    text.given("series", series.as_deref());
     write_transfer(text, transfer);
     Ok(())
 }

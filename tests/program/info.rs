@@ -119,6 +119,32 @@ fn text_has_them_and_a_histogram() {
     assert!(info(&folder, "builtin:cube").contains("format       builtin\n"));
 }
 
+/// A folder of several series and a file of several times, and what chooses one of them.
+#[test]
+fn series_and_times_are_listed() {
+    let folder = Folder::new();
+    let times = info(&folder, &fixture("dicom/times.dcm"));
+    let line =
+        "times        2: 0 TemporalPositionIndex 1, 1 TemporalPositionIndex 2; what follows is about one, by --time";
+    assert!(times.lines().any(|found| found == line), "{times}");
+    let path = folder.path("export");
+    std::fs::create_dir(&path).unwrap();
+    for name in ["series/IM1", "series/IM2", "series/IM3.dcm", "jpeg2000-large.dcm"] {
+        let name = Path::new(name);
+        let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
+        std::fs::copy(from, path.join(name.file_name().unwrap())).unwrap();
+    }
+    let text = info(&folder, "export");
+    let of = |name: &str| text.lines().find_map(|line| line.strip_prefix(name)).unwrap_or_default().trim().to_owned();
+    assert_eq!(of("dims "), "5 × 4 × 3");
+    assert!(of("series ").starts_with("0: 3 of 5 × 4") && of("series ").contains("1: 1 of 70 × 50"), "{text}");
+    let second: Value = serde_json::from_str(&info(&folder, "export --json --series 1")).unwrap();
+    assert_eq!(second["dims"], serde_json::json!([70, 50, 1]));
+    assert_eq!(second["series"].as_array().unwrap().len(), 2);
+    let run = folder.run("render export --series 9 -o no.png");
+    run.assert_failure(2, &["series: found 9, allowed: a number or a SeriesInstanceUID of 0: 3 of 5 × 4"]);
+}
+
 /// Holes are counted; all other figures are about the finite samples.
 #[test]
 fn holes_are_counted_and_left_out() {

@@ -23,6 +23,36 @@ fn keys_choose_a_channel_and_a_time() {
     }
 }
 
+/// A folder with slices of two series, by the number of one or its identity; saved scenes keep it, and nothing but DICOM has any.
+#[test]
+fn a_key_chooses_a_series() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["IM1", "IM2", "IM3.dcm"] {
+        fs::copy(fixture("series").join(name), folder.path().join(name)).unwrap();
+    }
+    fs::copy(fixture("jpeg2000-large.dcm"), folder.path().join("large")).unwrap();
+    let source = || VolumeSource::File(folder.path().to_owned());
+    let dims = |series: &str| {
+        let scene = Scene::from_volume(source(), &[format!("volume.series={series}")]).unwrap();
+        let saved = Scene::parse(&scene.to_toml(Path::new("")).unwrap(), "scene.toml", Path::new(""), &[]).unwrap();
+        assert_eq!(saved.series, scene.series);
+        saved.load_volume().map(|volume| volume.dims().to_array())
+    };
+    assert_eq!(
+        [dims("0").unwrap(), dims("\"1\"").unwrap(), dims("1.2.4").unwrap()],
+        [[5, 4, 3], [70, 50, 1], [5, 4, 3]]
+    );
+    let message = dims("2").unwrap_err().to_string();
+    assert!(
+        message.contains("series: found 2, allowed: a number or a SeriesInstanceUID of 0: 3 of 5 × 4"),
+        "{message}"
+    );
+    let scene = Scene::from_volume(VolumeSource::File(fixture("c.npy")), &["volume.series=0".to_owned()]).unwrap();
+    let message = scene.load_volume().unwrap_err().to_string();
+    assert!(message.contains("series: found 0, allowed: no series, which only DICOM has"), "{message}");
+    assert!(Scene::from_volume(source(), &["volume.series=-1".to_owned()]).is_err());
+}
+
 /// Asserts that the message names the file.
 #[track_caller]
 fn assert_outside(result: Result<Volume, VolumeError>, file: &str) {

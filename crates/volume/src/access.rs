@@ -41,6 +41,8 @@ pub struct ReadOptions {
     /// The level, from 0 for the finest, to read of a store with several; `None` reads the one that a renderer's
     /// scene chooses, and without a scene the finest, which must fit in memory.
     pub level: Option<u32>,
+    /// The series to read of a folder, or of a DICOM file, with several: its number, from 0, or its `SeriesInstanceUID`; `None` reads the largest.
+    pub series: Option<String>,
     /// The file with the ranges of the values in a store's chunks, made by `sheetsplat index` ([`StoreIndex`](super::StoreIndex)). Where a scene's volume is
     /// streamed, chunks without visible values are not read.
     pub index: Option<PathBuf>,
@@ -73,6 +75,11 @@ impl ReadOptions {
     /// These options with another level of a store with several, counted from 0 for the finest.
     pub fn with_level(self, level: u32) -> Self {
         Self { level: Some(level), ..self }
+    }
+
+    /// These options with a series of a folder with several: its number, counted from 0, or its `SeriesInstanceUID`.
+    pub fn with_series(self, series: impl Into<String>) -> Self {
+        Self { series: Some(series.into()), ..self }
     }
 
     /// These options with an index of the store's chunks. An index that cannot be read, or is another store's, is an error, however small the volume is.
@@ -136,7 +143,7 @@ impl ReadOptions {
 
 /// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
 #[derive(Clone)]
-pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>);
+pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>, Option<Arc<str>>);
 
 struct Inner {
     given: Option<Files>,
@@ -172,13 +179,14 @@ impl Access {
             Arc::new(inner),
             Selection { channel: options.channel, time: options.time, level: options.level },
             None,
+            options.series.as_deref().map(Arc::from),
         ))
     }
 
     /// The same access for readers that only note where samples are, and read none.
     pub(super) fn noting(&self) -> (Self, Arc<Notes>) {
         let notes = Arc::new(Notes::default());
-        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes))), notes)
+        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes)), self.3.clone()), notes)
     }
 
     /// Whether readers note where samples are, and read none.
@@ -201,7 +209,7 @@ impl Access {
     /// The same access to files of one volume, at a level.
     #[doc(hidden)]
     pub fn whole_at(&self, level: u32) -> Self {
-        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None)
+        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None, None)
     }
 
     /// The same access to other volumes of a file. What the options select goes before it.
@@ -209,7 +217,19 @@ impl Access {
     pub fn selecting(&self, other: Selection) -> Self {
         let Selection { channel, time, level } = self.1;
         let (channel, time, level) = (channel.or(other.channel), time.or(other.time), level.or(other.level));
-        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone())
+        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone(), self.3.clone())
+    }
+
+    /// The same access to a series of a folder. The one that the options choose goes before it.
+    #[doc(hidden)]
+    pub fn of_series(&self, series: Option<&str>) -> Self {
+        let series = self.3.clone().or_else(|| series.map(Arc::from));
+        Self(Arc::clone(&self.0), self.1, self.2.clone(), series)
+    }
+
+    /// The series that is read of a folder with several; `None` for the largest.
+    pub(super) fn series(&self) -> Option<&str> {
+        self.3.as_deref()
     }
 
     /// The path to open for a file or folder. If reading is confined, it has no links in it.

@@ -50,11 +50,23 @@ const ZARR: &str = "Zarr";
 /// Formats whose files, if they are uncompressed, are read by boxes.
 const SEEKABLE: [&str; 4] = ["NRRD", "NIfTI", "MetaImage", "NPY"];
 
+/// What volumes allow that are not of a format with several series.
+const NO_SERIES: &str = "no series, which only DICOM has";
+
 /// Formats with one slice per file of a folder.
 const SLICES: [&str; 2] = ["TIFF", DICOM];
 
 fn formats<T: Voxel>() -> Vec<Format<T>> {
     vec![
+        // The preamble before `DICM` may be the beginning of any other file, often of a TIFF (PS3.10 7.1), so that this format comes first. The group of
+        // the element after it tells it from another format's text.
+        Format {
+            name: DICOM,
+            extensions: &[".dcm"],
+            is_magic: |head| head.get(128..134) == Some(b"DICM\x02\0"),
+            read: reader!("dicom", super::dicom::read),
+            read_folder: reader!("dicom", super::dicom::read_folder).ok(),
+        },
         Format {
             name: "NRRD",
             extensions: &[".nrrd", ".nhdr"],
@@ -65,9 +77,13 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
         Format {
             name: "NIfTI",
             extensions: &[".nii", ".nii.gz", ".hdr", ".img", ".hdr.gz", ".img.gz"],
+            // Other files may hold the magic, which is not at their beginning, among their data.
             is_magic: |head| {
-                matches!(head.get(344..348), Some(b"n+1\0" | b"ni1\0"))
-                    || matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
+                let [size, swapped] =
+                    head.first_chunk().map_or([0; 2], |&size| [u32::from_le_bytes(size), u32::from_be_bytes(size)]);
+                let is_sized = |bytes: u32| size == bytes || swapped == bytes;
+                is_sized(348) && matches!(head.get(344..348), Some(b"n+1\0" | b"ni1\0"))
+                    || is_sized(540) && matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
             },
             read: reader!("nifti", super::nifti::read),
             read_folder: None,
@@ -117,16 +133,13 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
             read_folder: reader!("tiff", super::tiff::read_folder).ok(),
         },
         Format {
-            name: DICOM,
-            extensions: &[".dcm"],
-            is_magic: |head| head.get(128..132) == Some(b"DICM"),
-            read: reader!("dicom", super::dicom::read),
-            read_folder: reader!("dicom", super::dicom::read_folder).ok(),
-        },
-        Format {
             name: "VTI",
             extensions: &[".vti"],
-            is_magic: |head| head.windows(8).any(|window| window == b"<VTKFile"),
+            // Other texts may hold the element's name, too.
+            is_magic: |head| {
+                let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+                text.starts_with(b"<") && text.windows(8).any(|window| window == b"<VTKFile")
+            },
             read: reader!("vtk", super::vtk::read_image_data),
             read_folder: None,
         },
@@ -149,6 +162,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     if let Some(level) = access.selection().level.filter(|&level| level > 0 && format.is_none_or(|of| of.name != ZARR))
     {
         return Err(invalid(path, "level", level, "0, the only one"));
+    }
+    if let Some(series) = access.series().filter(|_| format.is_some_and(|of| of.name != DICOM)) {
+        return Err(invalid(path, "series", series, NO_SERIES));
     }
     let found = match format {
         None if access.is_folder(file)? => return read_folder(path, access, &formats),
@@ -174,7 +190,11 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
 /// Opens the selected channels of a file that is read by boxes.
 pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
     let formats = formats::<f32>();
-    let found = match format_at(&formats, path, access)? {
+    let format = format_at(&formats, path, access)?;
+    if let Some(series) = access.series().filter(|_| format.is_some_and(|of| of.name != DICOM)) {
+        return Err(invalid(path, "series", series, NO_SERIES));
+    }
+    let found = match format {
         #[cfg(feature = "zarr")]
         Some(Format { name: ZARR, .. }) => return super::zarr::open(path, ZARR, access),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
@@ -281,7 +301,12 @@ fn read_folder<T: Voxel>(
     }
     let found = match slices.as_slice() {
         [] => format!("{count} files, no slices among them"),
-        [(Format { name, read_folder: Some(read), .. }, files)] => return Ok((name, read(path, files, access)?)),
+        [(Format { name, read_folder: Some(read), .. }, files)] => {
+            if let Some(series) = access.series().filter(|_| *name != DICOM) {
+                return Err(invalid(path, "series", series, NO_SERIES));
+            }
+            return Ok((name, read(path, files, access)?));
+        }
         [(Format { name, read: Err(feature), .. }, _)] => needs(name, feature),
         several => {
             let counts = several.iter().map(|(Format { name, .. }, files)| format!("{} {name} files", files.len()));

@@ -72,6 +72,8 @@ mod texel;
 mod text;
 #[cfg(feature = "tiff")]
 mod tiff;
+#[cfg(feature = "dicom")]
+mod uneven;
 mod unit;
 mod value_slice;
 mod values;

@@ -32,6 +32,10 @@ pub(super) struct Loaded<T: Voxel> {
     pub(super) series: Series,
     /// The names of the file's channels, from the first on; there may be fewer than channels.
     pub(super) channel_names: Vec<String>,
+    /// What tells the file's times apart, from the first on; there may be fewer than times.
+    pub(super) time_names: Vec<String>,
+    /// The series among which the folder's was chosen.
+    pub(super) series_names: Vec<String>,
     /// How the channels are shown, from the first on; there may be fewer than channels.
     pub(super) displays: Vec<ChannelDisplay>,
     /// The levels in the file, of which the values are one.
@@ -57,6 +61,7 @@ impl<T: Voxel> Loaded<T> {
     pub(super) fn new(dims: UVec3, kind: SampleType, values: T::Many) -> Self {
         let (label_names, series, channel_names) = (BTreeMap::new(), Series::default(), Vec::new());
         let (spacing, unit, orientation, palette) = (None, None, None, None);
+        let (time_names, series_names) = (Vec::new(), Vec::new());
         let (displays, levels) = (Vec::new(), None);
         Self {
             dims,
@@ -68,6 +73,8 @@ impl<T: Voxel> Loaded<T> {
             label_names,
             series,
             channel_names,
+            time_names,
+            series_names,
             displays,
             levels,
             values,
@@ -88,6 +95,8 @@ impl<T: Voxel> Loaded<T> {
             label_names: label_names.clone(),
             channel_name: self.channel_names.get(channel).cloned(),
             display: display.cloned(),
+            time_names: self.time_names.clone(),
+            series_names: self.series_names.clone(),
         }
     }
 

@@ -19,7 +19,7 @@ impl Volume {
     /// feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MGH (`.mgh`, `.mgz`), MetaImage (`.mha`, `.mhd`), NPY
     /// (`.npy`) and its archives (`.npz`: their only array, or the one named as in `file.npz:name`), TIFF (`.tif`, `.tiff`), DICOM
     /// (`.dcm`), VTK (`.vti`, `.vtk`) and Zarr (folders, and archives `.zip` and `.ozx`). The path may also be a folder of slices: TIFF files of one page,
-    /// or the DICOM files of one series.
+    /// or DICOM files, of whose series the largest is read, or that of [`ReadOptions::series`].
     ///
     /// # Errors
     /// If the file cannot be read, is of no format that is compiled in, does not hold what its header promises, or needs more memory

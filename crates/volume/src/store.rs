@@ -110,6 +110,10 @@ pub struct StoreFacts {
     pub channel_name: Option<String>,
     /// How the channel is shown.
     pub display: Option<ChannelDisplay>,
+    /// What tells the file's times apart, from the first on, where that is more than their numbers.
+    pub time_names: Vec<String>,
+    /// The series among which a folder's was chosen, in the order of their numbers from 0; empty if there is only one.
+    pub series_names: Vec<String>,
 }
 
 /// A level of a [`Store`]: the volume at one resolution.

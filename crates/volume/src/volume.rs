@@ -42,6 +42,8 @@ pub struct Volume {
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
     pub(super) channel_name: Option<String>,
     pub(super) display: Option<ChannelDisplay>,
+    pub(super) time_names: Vec<String>,
+    pub(super) series_names: Vec<String>,
     pub(super) further: Vec<Arc<Volume>>,
     pub(super) levels: Vec<UVec3>,
     pub(super) level: u32,
@@ -151,6 +153,8 @@ impl Volume {
             palette: None,
             channel_name: None,
             display: None,
+            time_names: Vec::new(),
+            series_names: Vec::new(),
             further: Vec::new(),
             levels: Vec::new(),
             level: 0,
@@ -191,9 +195,20 @@ impl Volume {
 
     /// The same volume with what its file states beside its grid and values.
     pub(super) fn stating(self, origin: &str, facts: StoreFacts) -> Result<Self, VolumeError> {
-        let StoreFacts { encoding, spacing: _, unit, orientation, palette, label_names, channel_name, display } = facts;
-        Self { encoding, unit, palette, label_names, channel_name, display, ..self }
+        let StoreFacts { encoding, spacing: _, unit, orientation, palette, .. } = facts;
+        let StoreFacts { label_names, channel_name, display, time_names, series_names, .. } = facts;
+        Self { encoding, unit, palette, label_names, channel_name, display, time_names, series_names, ..self }
             .with_orientation(origin, orientation)
+    }
+
+    /// What tells the times of the volume's file apart, from the first on, where that is more than their numbers.
+    pub fn time_names(&self) -> &[String] {
+        &self.time_names
+    }
+
+    /// The series among which the volume's was chosen, in the order of their numbers from 0; empty if there is only one.
+    pub fn series_names(&self) -> &[String] {
+        &self.series_names
     }
 
     /// The number of voxels along x, y and z of each level that the volume's store holds, from the finest; empty if it comes from no such store.

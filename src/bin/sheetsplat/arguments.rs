@@ -30,6 +30,7 @@ const FLAGS: [(&str, &str); 14] = [
     ("--channel", "volume.index"),
     ("--time", "volume.time"),
     ("--level", "volume.level"),
+    ("--series", "volume.series"),
     ("--preset", "preset"),
     ("--colormap", "transfer.colormap"),
     ("--size", "image.width"),
@@ -150,6 +151,10 @@ struct Raw {
     /// whose voxels are no larger than a pixel.
     #[arg(long, value_name = "N")]
     level: Option<String>,
+    /// The series of a DICOM folder with several, by its number, counted from 0, or its SeriesInstanceUID: short for --set volume.series=N. The default is
+    /// the largest; `info` lists them.
+    #[arg(long, value_name = "N or UID")]
+    series: Option<String>,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -235,7 +240,8 @@ impl Input {
 
     /// What the flags are short for, with a time to be shown.
     fn flags(&self, time: Option<&str>) -> impl Iterator<Item = String> {
-        let Self { raw: Raw { dims, r#type, endian, offset, spacing, channel, time: _, level }, look, .. } = self;
+        let Self { raw: Raw { dims, r#type, endian, offset, spacing, channel, time: _, level, series }, look, .. } =
+            self;
         let Look { preset, size, background, colormap, window } = look;
         let vector =
             |numbers: &Option<String>| numbers.as_ref().map(|text| format!("[{}]", text.replace(['x', '×'], ",")));
@@ -249,6 +255,8 @@ impl Input {
             channel.clone(),
             time.map(str::to_owned),
             level.clone(),
+            // Text, because an identity may look like a number.
+            series.as_ref().map(|text| format!("{text:?}")),
             preset.clone(),
             colormap.clone(),
             width,

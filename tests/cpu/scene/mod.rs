@@ -149,6 +149,7 @@ fn every_key() {
         index: None,
         time: None,
         level: None,
+        series: None,
         name: None,
         visible: true,
         camera: Camera {

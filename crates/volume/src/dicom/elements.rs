@@ -12,7 +12,15 @@ use super::super::head::is_bare_dicom;
 use super::bytes::Bytes;
 use super::dataset::{Dataset, Tag, name, shown_tag, tags};
 
-const SEQUENCES: [Tag; 6] = [
+const SEQUENCES: [Tag; 14] = [
+    tags::GRADIENTS,
+    tags::ECHO,
+    tags::DIFFUSION,
+    tags::CARDIAC,
+    tags::MR_FRAME_TYPE,
+    tags::FRAME_CONTENT,
+    tags::MODALITY_LUT,
+    tags::DETECTORS,
     tags::PLANE_POSITION,
     tags::PLANE_ORIENTATION,
     tags::PIXEL_MEASURES,
@@ -35,8 +43,8 @@ const UNDEFINED: u32 = u32::MAX;
 const MAX_DEPTH: u32 = 32;
 /// The maximum number of items kept in all sequences: a few for every frame.
 const MAX_ITEMS: u32 = 1 << 20;
-/// The maximum size in bytes of a value that is kept.
-const MAX_VALUE: u32 = 1 << 12;
+/// The maximum size in bytes of a value that is kept: a table of 65536 numbers of 16 bits.
+const MAX_VALUE: u32 = 1 << 17;
 
 /// A file's elements, and the place of its pixels.
 pub(super) struct Elements {
@@ -136,6 +144,8 @@ struct Header {
     is_sequence: bool,
     /// Whether its value may be a sequence whose elements have no explicit types.
     is_unknown: bool,
+    /// Whether its value, if its length is undefined, consists of fragments, not of items with elements.
+    has_fragments: bool,
     in_words: bool,
     length: u32,
 }
@@ -159,7 +169,9 @@ impl Parser {
         let [a, b, c, d] = self.begun.take().map_or_else(|| self.bytes.take(), Ok)?;
         let tag = if self.big_endian { [a, b, c, d] } else { [b, a, d, c] };
         let tag = Tag::from_be_bytes(tag);
-        let mut header = Header { tag, is_sequence: false, is_unknown: false, in_words: false, length: 0 };
+        let has_fragments = PIXELS.contains(&tag);
+        let mut header =
+            Header { tag, is_sequence: false, is_unknown: false, has_fragments, in_words: false, length: 0 };
         if self.implicit || matches!(tag, ITEM | ITEM_END | SEQUENCE_END) {
             header.is_sequence = SEQUENCES.contains(&tag);
             header.in_words = true;
@@ -174,6 +186,7 @@ impl Parser {
         header.is_sequence = kind == *b"SQ";
         header.is_unknown = kind == *b"UN";
         header.in_words = kind == *b"OW";
+        header.has_fragments |= kind[0] == b'O';
         let is_long = [b"OB", b"OD", b"OF", b"OL", b"OV", b"OW", b"SQ", b"SV", b"UC", b"UN", b"UR", b"UT", b"UV"];
         header.length = if is_long.contains(&&kind) {
             self.bytes.take::<2>()?;
@@ -204,7 +217,10 @@ impl Parser {
                 self.pixels = Some((header.tag, self.pixels(&header)?));
                 break;
             }
-            if header.length == UNDEFINED || header.is_sequence {
+            if header.length == UNDEFINED && header.has_fragments {
+                // Those of an icon, say, or of a private element.
+                self.pixels(&header)?;
+            } else if header.length == UNDEFINED || header.is_sequence {
                 self.sequence(&header, end, depth, &mut data)?;
             } else {
                 self.value(&header, end, &mut data)?;

@@ -3,8 +3,6 @@
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use glam::DVec3;
-
 use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::error::volume::{invalid, io_error};
@@ -12,7 +10,10 @@ use super::super::sample_type::SampleType;
 use super::codecs::Codec;
 use super::dataset::{Dataset, Tag, tags};
 use super::elements::{Elements, PixelData};
+use super::frames::{self, Assumed, Frame};
+use super::marks::{self, Marked};
 use super::palette::{self, Palette};
+use super::table::Table;
 
 /// The class of files that contain no image but a list of other files.
 const DIRECTORY: &str = "1.2.840.10008.1.3.10";
@@ -20,13 +21,41 @@ const DIRECTORY: &str = "1.2.840.10008.1.3.10";
 /// The photometric interpretation of pixels that are indices of a palette.
 const INDICES: &str = "PALETTE COLOR";
 
+/// What a file says about the series that it belongs to.
+pub(super) struct Belonging {
+    pub(super) path: PathBuf,
+    pub(super) series: String,
+    /// The number of the series; the largest if the file states none.
+    pub(super) series_number: i64,
+    pub(super) description: String,
+}
+
+/// A file with pixels.
+pub(super) enum Opened {
+    Image(Image),
+    /// One that cannot be part of a volume.
+    Refused {
+        belonging: Belonging,
+        /// Whether it has a position, so that the volume would lack it.
+        is_placed: bool,
+        error: VolumeError,
+    },
+}
+
 /// An image of one or more frames.
 pub(super) struct Image {
     pub(super) path: PathBuf,
-    /// The series that the image belongs to, with its number and description for errors.
-    pub(super) series: String,
-    pub(super) description: String,
+    pub(super) belonging: Belonging,
+    /// The instance's identity and number, each empty if the file does not state it.
+    pub(super) instance: String,
+    pub(super) number: String,
+    /// What the file states about all its frames that tells images at one place apart.
+    pub(super) marked: Marked,
+    /// What is missing, so that frames were placed by defaults.
+    pub(super) assumed: Option<Assumed>,
     pub(super) pixels: Pixels,
+    /// The values of samples, if a table states them.
+    table: Option<Table>,
     /// The colours of values, if these are indices.
     pub(super) palette: Option<Palette>,
     pub(super) frames: Vec<Frame>,
@@ -55,29 +84,39 @@ pub(super) struct Pixels {
     is_ybr: bool,
 }
 
-/// A frame's position, in LPS and millimetres.
-#[derive(Clone, Copy)]
-pub(super) struct Frame {
-    /// The position of the first pixel.
-    pub(super) position: DVec3,
-    /// The directions of x and y.
-    pub(super) directions: [DVec3; 2],
-    /// The distances between pixels along x and y.
-    pub(super) spacing: [f64; 2],
-    /// The distance between frames, if the frame itself states it.
-    pub(super) thickness: Option<f64>,
-    /// Slope and intercept.
-    pub(super) rescale: [f64; 2],
-}
-
 impl Image {
     /// Reads the elements before the pixels; `None` if the file is not an image.
-    pub(super) fn open(path: &Path, access: &Access) -> Result<Option<Self>, VolumeError> {
-        let Elements { data, transfer_syntax, big_endian, pixels, mut rest } = Elements::read(path, access)?;
-        let Some((tag, pixel_data)) = pixels else { return Ok(None) };
-        if data.text(tags::MEDIA_SOP_CLASS).as_deref() == Some(DIRECTORY) {
+    pub(super) fn open(path: &Path, access: &Access) -> Result<Option<Opened>, VolumeError> {
+        let elements = Elements::read(path, access)?;
+        let data = &elements.data;
+        if elements.pixels.is_none() || data.text(tags::MEDIA_SOP_CLASS).as_deref() == Some(DIRECTORY) {
             return Ok(None);
         }
+        let belonging = |data: &Dataset| Belonging {
+            path: path.to_owned(),
+            series: data.text(tags::SERIES).unwrap_or_default(),
+            series_number: data.text(tags::SERIES_NUMBER).and_then(|text| text.parse().ok()).unwrap_or(i64::MAX),
+            description: [tags::MODALITY, tags::SERIES_DESCRIPTION]
+                .into_iter()
+                .filter_map(|tag| data.text(tag))
+                .collect::<Vec<_>>()
+                .join(" "),
+        };
+        let (refused, is_placed) = (belonging(data), frames::are_placed(data));
+        match Self::of(path, elements, belonging, access) {
+            Ok(image) => Ok(image.map(Opened::Image)),
+            Err(error) => Ok(Some(Opened::Refused { belonging: refused, is_placed, error })),
+        }
+    }
+
+    fn of(
+        path: &Path,
+        elements: Elements,
+        belonging: impl Fn(&Dataset) -> Belonging,
+        access: &Access,
+    ) -> Result<Option<Self>, VolumeError> {
+        let Elements { data, transfer_syntax, big_endian, pixels, mut rest } = elements;
+        let Some((tag, pixel_data)) = pixels else { return Ok(None) };
         let codec =
             Codec::of(&transfer_syntax).map_err(|found| data.invalid(tags::TRANSFER_SYNTAX, found, Codec::ALLOWED))?;
         let pixels = Pixels::of(&data, tag, big_endian, codec)?;
@@ -93,10 +132,11 @@ impl Image {
         }
         let count = count as usize;
         pixels.check(&data, tag, &pixel_data, count, codec)?;
-        let frames = frames(&data, count)?;
+        let (frames, assumed) = frames::read(&data, count)?;
         let is_signed = matches!(pixels.kind, SampleType::I8 | SampleType::I16 | SampleType::I32);
         let has_palette = data.text(tags::PHOTOMETRIC).as_deref() == Some(INDICES);
         let palette = has_palette.then(|| palette::read(&data, is_signed)).transpose()?;
+        let table = data.items(tags::MODALITY_LUT).first().map(|item| Table::read(item, is_signed)).transpose()?;
         let inflated = match &pixel_data {
             PixelData::Native { bytes, .. } if rest.is_inflated() => {
                 access.reserve(path, "PixelData", format!("{count} inflated frames"), *bytes)?;
@@ -106,19 +146,24 @@ impl Image {
         };
         Ok(Some(Self {
             path: path.to_owned(),
-            series: data.text(tags::SERIES).unwrap_or_default(),
-            description: [tags::MODALITY, tags::SERIES_DESCRIPTION]
-                .into_iter()
-                .filter_map(|tag| data.text(tag))
-                .collect::<Vec<_>>()
-                .join(" "),
+            belonging: belonging(&data),
+            instance: data.text(tags::SOP_INSTANCE).unwrap_or_default(),
+            number: data.text(tags::INSTANCE_NUMBER).unwrap_or_default(),
+            marked: marks::of_file(&data),
+            assumed,
             frames,
             pixels,
+            table: table.filter(|_| pixels.samples == 1),
             palette,
             codec,
             data: pixel_data,
             inflated,
         }))
+    }
+
+    /// The type of the samples that [`Self::frame`] gives.
+    pub(super) fn kind(&self) -> SampleType {
+        if self.table.is_some() { SampleType::U16 } else { self.pixels.kind }
     }
 
     /// A frame's samples, in the machine's byte order.
@@ -148,6 +193,9 @@ impl Image {
         let mut bytes = self.pixels.side_by_side(bytes, self.codec);
         if self.pixels.is_ybr {
             bytes.as_chunks_mut().0.iter_mut().for_each(|pixel| *pixel = rgb(*pixel));
+        }
+        if let Some(table) = &self.table {
+            bytes = table.values_of(&bytes, kind);
         }
         Ok(bytes)
     }
@@ -336,52 +384,4 @@ fn rgb([y, blue, red]: [u8; 3]) -> [u8; 3] {
     let [y, blue, red] = [f64::from(y), f64::from(blue) - 128.0, f64::from(red) - 128.0];
     let colors = [y + 1.402 * red, y - 0.344_136 * blue - 0.714_136 * red, y + 1.772 * blue];
     colors.map(|color| color.round().clamp(0.0, 255.0) as u8)
-}
-
-/// The positions of frames, from each frame's own groups of elements, the shared groups, or the file's own elements.
-fn frames(data: &Dataset, count: usize) -> Result<Vec<Frame>, VolumeError> {
-    let shared = data.items(tags::SHARED_GROUPS).first();
-    let groups = data.items(tags::FRAME_GROUPS);
-    if groups.len() != count && (count > 1 || !groups.is_empty()) {
-        return Err(data.invalid(
-            tags::FRAME_GROUPS,
-            format!("{} items", groups.len()),
-            format!("{count}, one per frame"),
-        ));
-    }
-    let of = |frame: usize| {
-        let own = groups.get(frame);
-        let group = |sequence: Tag| {
-            let mut groups = [own, shared].into_iter().flatten();
-            groups.find_map(|groups| groups.items(sequence).first()).unwrap_or(data)
-        };
-        let positive = |text: Option<[f64; 1]>| text.map(|[number]| number.abs()).filter(|&number| number > 0.0);
-        let plane = group(tags::PLANE_POSITION);
-        let allowed = "the image's position in the patient";
-        let position = plane.numbers(tags::POSITION)?.ok_or_else(|| plane.missing(tags::POSITION, allowed))?;
-        let plane = group(tags::PLANE_ORIENTATION);
-        let orientation =
-            plane.numbers::<6>(tags::ORIENTATION)?.ok_or_else(|| plane.missing(tags::ORIENTATION, allowed))?;
-        let [row, column] = [0, 3].map(|first| DVec3::from_slice(&orientation[first..]));
-        let measures = group(tags::PIXEL_MEASURES);
-        let [y, x] = measures
-            .numbers(tags::PIXEL_SPACING)?
-            .ok_or_else(|| measures.missing(tags::PIXEL_SPACING, "the distances between pixels"))?;
-        if x <= 0.0 || y <= 0.0 {
-            return Err(measures.invalid(tags::PIXEL_SPACING, format!("[{y}, {x}]"), "two positive numbers"));
-        }
-        let between = positive(measures.numbers(tags::SPACING_BETWEEN_SLICES)?);
-        let thickness = between.or(positive(measures.numbers(tags::SLICE_THICKNESS)?));
-        let values = group(tags::PIXEL_TRANSFORMATION);
-        let slope = values.numbers(tags::SLOPE)?.map_or(1.0, |[slope]| slope);
-        let intercept = values.numbers(tags::INTERCEPT)?.map_or(0.0, |[intercept]| intercept);
-        Ok(Frame {
-            position: DVec3::from_array(position),
-            directions: [row, column],
-            spacing: [x, y],
-            thickness,
-            rescale: [slope, intercept],
-        })
-    };
-    (0..count).map(of).collect()
 }

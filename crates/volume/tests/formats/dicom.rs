@@ -1,6 +1,8 @@
 //! DICOM as pydicom writes it, and invalid series.
 
-use sheetsplat_volume::{Encoding, Labels, SampleType};
+mod several;
+
+use sheetsplat_volume::{Encoding, Labels, ReadOptions, SampleType};
 
 use crate::*;
 
@@ -49,6 +51,16 @@ fn frames_of_pydicom() {
         let volume = open(name);
         assert_lies_as_written(&volume);
         assert_eq!(volume.encoding().unwrap().sample_type, kind, "{name}");
+    }
+}
+
+/// Slices that are TIFF files, too, and slices with icons whose pixels are compressed, also in private sequences (`pydicom.dcmread(…).pixel_array`).
+#[test]
+fn slices_with_something_else_in_them() {
+    for name in ["dicom/preambles", "dicom/icons"] {
+        let volume = open(name);
+        assert_lies_as_written(&volume);
+        assert_eq!(volume.encoding().unwrap().format, "DICOM", "{name}");
     }
 }
 
@@ -151,13 +163,17 @@ impl Slice {
 
 /// Opens a folder with some slices, which are named `0`, `1`, …
 fn series(slices: &[Slice]) -> Result<Volume, VolumeError> {
+    series_with(slices, &ReadOptions::default())
+}
+
+fn series_with(slices: &[Slice], options: &ReadOptions) -> Result<Volume, VolumeError> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("series");
     fs::create_dir(&path).unwrap();
     for (number, slice) in slices.iter().enumerate() {
         fs::write(path.join(number.to_string()), slice.bytes()).unwrap();
     }
-    Volume::open(&path)
+    Volume::open_with(&path, options)
 }
 
 fn at(places: &[f64]) -> Vec<Slice> {
@@ -176,16 +192,27 @@ fn places_order_and_space_slices() {
     assert!(series(&names).unwrap().values().iter().zip([0, 1, 2, 3, 4, 5, 30]).all(|(v, e)| v == 2.0 * e as f32));
 }
 
+/// Missing slices lie linearly between their neighbours, as in `numpy.interp(range(0, 12, 2), [0, 2, 4, 8, 10], slices)`.
 #[test]
-fn uneven_places_are_gaps_or_about_even() {
-    let refused = |places: &[f64], found: &str| {
-        let allowed = "slices at even distances, one at each place";
-        assert_refused(series(&at(places)), "series", "ImagePositionPatient", found, allowed);
-    };
-    refused(&[0.0, 2.0, 4.0, 8.0, 10.0], "4.0000 mm between 2 and 3, 2.0000 mm between others");
-    refused(&[0.0, 2.0, 4.0, 4.0], "0.0000 mm between 2 and 3, 2.0000 mm between others");
-    refused(&[0.0, 2.0, 4.0, 5.0], "1.0000 mm between 2 and 3");
-    refused(&[1.0, 1.0], "0.0000 mm between 0 and 1");
+fn uneven_slices_are_resampled() {
+    let (volume, warnings) = warned(|| series(&at(&[0.0, 2.0, 4.0, 8.0, 10.0])).unwrap());
+    assert_warned(
+        &warnings,
+        "4.0000 mm between 2 and 3, 2.0000 mm between others: resampled to 6 slices, 2.0000 mm apart",
+    );
+    assert_eq!((volume.dims(), volume.spacing().z), (UVec3::new(3, 2, 6), 2.0));
+    let expected: Vec<f32> = (0..36).map(|i| (20 * (i / 6) + i % 6) as f32).collect();
+    assert_eq!(volume.values(), expected);
+    // The finest distance is that of the last two.
+    let (volume, warnings) = warned(|| series(&at(&[0.0, 2.0, 4.0, 5.0])).unwrap());
+    assert_warned(&warnings, "1.0000 mm between 2 and 3, 2.0000 mm between others: resampled to 6 slices, 1.0000 mm");
+    let expected: Vec<f32> = (0..36).map(|i| (10 * (i / 6) + i % 6) as f32).collect();
+    assert_eq!((volume.spacing().z, volume.values()), (1.0, (&expected).into()));
+    assert_near(volume.orientation().unwrap().origin, DVec3::new(-1.0, -2.0, 0.0));
+    let allowed = "slices of which at most three times as many are missing";
+    let found = "distances from 2.0000 to 96.0000, which need 50 samples";
+    assert_refused(series(&at(&[0.0, 2.0, 4.0, 100.0, 98.0])), "series", "ImagePositionPatient", "94.0000 mm", allowed);
+    assert_refused(series(&at(&[0.0, 2.0, 98.0])), "series", "ImagePositionPatient", found, allowed);
     // Off by a tenth of a step, with a warning.
     let volume = series(&at(&[0.0, 2.2, 4.0, 6.0])).unwrap();
     assert_eq!(volume.spacing().z, 2.0);
@@ -298,21 +325,6 @@ fn folders_hold_files_without_preamble_too() {
 }
 
 #[test]
-fn mixed_series_are_listed() {
-    let mut slices = at(&[0.0, 2.0, 4.0]);
-    slices[1] = Slice::at(2.0).with(SERIES, "1.2.4").with((0x08, 0x103e), "scout");
-    let found = "2 series: 2 of CT a chest (1.2.3), 1 of CT scout (1.2.4)";
-    assert_refused(series(&slices), "series", "SeriesInstanceUID", found, "the slices of one series");
-    slices[1] = Slice::at(2.0).with(ORIENTATION, "0\\1\\0\\0\\0\\1").with(PIXEL_SPACING, "1\\2");
-    let found =
-        "2 of 3 × 2, 0.5 × 0.5 mm, along [1, 0, 0] and [0, 1, 0]; 1 of 3 × 2, 2 × 1 mm, along [0, 1, 0] and [0, 0, 1]";
-    assert_refused(series(&slices), "series", "slices", found, "one orientation");
-    let mut slices = at(&[0.0, 2.0]);
-    slices[0] = Slice::at(0.0).number(0x28, 0x10, 3).number(0x28, 0x11, 2);
-    assert_refused(series(&slices), "series", "slices", "1 of 2 × 3", "slices of one size");
-}
-
-#[test]
 fn indices_have_the_colours_of_their_palette() {
     // Indices from 10 on, as slices at z = 1 have.
     let slice = |z: f64, red: &[u16]| {
@@ -409,7 +421,12 @@ fn wrong_elements() {
     refused(slice().number(0x28, 0x101, 17), "BitsStored", "17", "1 to 16");
     refused(slice().number(0x28, 0x102, 11), "HighBit", "11", "15, the highest of 16");
     let frames = Slice { samples: vec![0; 12], ..slice().with(FRAME_COUNT, "2") };
-    refused(frames, "PerFrameFunctionalGroupsSequence", "0 items", "2, one per frame");
+    refused(
+        frames.with((0x3004, 0x0c), "0\\1\\2"),
+        "GridFrameOffsetVector",
+        "0\\\\1\\\\2",
+        "finite numbers, 2 of them",
+    );
 
     let folder = Folder::new();
     let open = |name: &str, text: &str, instead: &str| folder.open("a.dcm", &replaced(name, text, instead));

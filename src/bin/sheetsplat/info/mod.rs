@@ -65,6 +65,10 @@ struct Info {
     colors: bool,
     /// Of the file.
     times: u32,
+    /// What tells the times apart, where it is more than their numbers.
+    time_names: Vec<String>,
+    /// The series of the folder; empty if there is only one.
+    series: Vec<String>,
     /// The sizes of the file's levels; `None` if it is no store of levels.
     levels: Option<Vec<[u32; 3]>>,
     /// The level that the fields below, and sizes and spacing, are about.
@@ -130,6 +134,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         channel_names: volume.channels().map(|channel| channel.channel_name().map(str::to_owned)).collect(),
         colors: volume.colors().is_some(),
         times: encoding.map_or(1, |encoding| encoding.times),
+        time_names: volume.time_names().to_vec(),
+        series: volume.series_names().to_vec(),
         levels: Some(levels(&opened)).filter(|levels| !levels.is_empty()),
         level: opened.level(),
         holes: volume.holes(),
@@ -196,7 +202,12 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
         line("colors", "every voxel has its own; what follows is about their luminance".to_owned());
     }
     if info.times > 1 {
-        line("times", format!("{}; what follows is about one, by --time", info.times));
+        let names = (0..).zip(&info.time_names).map(|(at, name)| format!("{at} {name}")).collect::<Vec<_>>().join(", ");
+        let names = if names.is_empty() { names } else { format!(": {names}") };
+        line("times", format!("{}{names}; what follows is about one, by --time", info.times));
+    }
+    if !info.series.is_empty() {
+        line("series", format!("{}; what follows is about one, by --series", info.series.join(", ")));
     }
     if let Some(levels) = &info.levels {
         let sizes = levels.iter().zip(0..).map(|([x, y, z], level)| format!("{level}: {x} × {y} × {z}"));
