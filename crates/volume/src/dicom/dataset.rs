@@ -53,6 +53,7 @@ tags! {
     PIXEL_REPRESENTATION = 0x0028_0103 "PixelRepresentation",
     INTERCEPT = 0x0028_1052 "RescaleIntercept",
     SLOPE = 0x0028_1053 "RescaleSlope",
+    RESCALE_TYPE = 0x0028_1054 "RescaleType",
     RED_DESCRIPTOR = 0x0028_1101 "RedPaletteColorLookupTableDescriptor",
     GREEN_DESCRIPTOR = 0x0028_1102 "GreenPaletteColorLookupTableDescriptor",
     BLUE_DESCRIPTOR = 0x0028_1103 "BluePaletteColorLookupTableDescriptor",

@@ -98,6 +98,7 @@ fn assemble<T: Voxel>(path: &Path, images: Vec<Image>, access: &Access) -> Resul
         log::warn!("{}: palettes differ, or indices are rescaled: no colour map is offered", path.display());
     }
     let palette = first.palette.clone().filter(|_| is_shared && !is_rescaled);
-    let loaded = Loaded { spacing, unit, orientation, palette, series, ..Loaded::new(dims, kind, values) };
+    let value_unit = first.value_unit.clone();
+    let loaded = Loaded { spacing, unit, value_unit, orientation, palette, series, ..Loaded::new(dims, kind, values) };
     lattice.straighten(path, series::POSITION, loaded, access)
 }
