@@ -105,6 +105,8 @@
 #[cfg_attr(not(feature = "cpu"), expect(dead_code, reason = "only the native backend stops early"))]
 mod abandon;
 mod after;
+#[cfg(feature = "annotate")]
+pub mod annotate;
 pub mod appearance;
 #[cfg(feature = "cpu")]
 pub mod cpu;
@@ -188,6 +190,14 @@ pub mod internals {
     /// Work that nobody waits for any more.
     pub mod abandon {
         pub use crate::abandon::watch;
+    }
+
+    /// Text in images.
+    #[cfg(feature = "annotate")]
+    pub mod text {
+        pub use crate::annotate::canvas::{filled, lay};
+        pub use crate::annotate::style::em;
+        pub use crate::annotate::text::*;
     }
 
     /// The reconstruction kernel.

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Sequence
 from typing import Any
 
 from .errors import SceneError, VolumeError, _Refused
 
-__all__ = ["finite", "refused", "volume_refused", "whole"]
+__all__ = ["finite", "names", "refused", "volume_refused", "whole"]
 
 
 def refused(kind: type[_Refused], key: str, found: object, allowed: str) -> _Refused:
@@ -41,3 +42,15 @@ def finite(key: str, value: Any, kind: type[_Refused] = SceneError) -> float:
     if not math.isfinite(number):
         raise refused(kind, key, repr(value), "a finite number")
     return number
+
+
+def names(annotate: str | Sequence[str]) -> list[str]:
+    """The names of annotations: several, or one text with commas."""
+    given: Any = annotate.split(",") if isinstance(annotate, str) else annotate
+    try:
+        texts = list(given)
+    except TypeError:
+        texts = [None]
+    if not all(isinstance(text, str) for text in texts):
+        raise refused(SceneError, "annotate", repr(annotate), "names of annotations")
+    return texts

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import _native as native
-from ._checks import finite, refused
+from ._checks import finite, names, refused
 from ._loading import loading
 from .errors import FileError, SceneError
 from .volume import Volume, _memory
@@ -117,7 +117,9 @@ class Scene:
         with loading(None, progress) as bytes_read:
             return Volume._of(self._native.load_volume(_memory(memory), bytes_read, index))
 
-    def explicit(self, volume: Volume, *, all_around: bool = False) -> Scene:
+    def explicit(
+        self, volume: Volume, *, all_around: bool = False, annotate: str | Sequence[str] = ()
+    ) -> Scene:
         """The same scene with everything stated that depends on the volume.
 
         Parameters
@@ -126,13 +128,15 @@ class Scene:
             The volume that determines the transfer function and the camera's position.
         all_around : bool
             Place the camera so that the object stays in the picture at constant size while the camera turns.
+        annotate : str or sequence of str
+            The words of the views that will draw the scene, as for `View`: the camera leaves room for them.
 
         Returns
         -------
         Scene
             The scene, which draws the same picture wherever its volume is drawn.
         """
-        return Scene._of(self._native.explicit(volume._native, all_around))
+        return Scene._of(self._native.explicit(volume._native, all_around, names(annotate)))
 
     def turned(self, degrees: float) -> Scene:
         """The scene with its camera turned about ``camera.up``.

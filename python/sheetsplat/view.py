@@ -11,7 +11,7 @@ from typing import Any
 
 from . import _movies as movies
 from . import _native as native
-from ._checks import finite, refused, whole
+from ._checks import finite, names, refused, whole
 from .errors import ImageError, SceneError
 from .image import Image
 from .part import Part, merge
@@ -52,6 +52,10 @@ class View:
         Show a bar while a path is read for more than a second, if tqdm is installed.
     index : str or path, optional
         As for `Volume`.
+    annotate : str or sequence of str
+        Words beside every picture, which then takes less of the image: ``"scale"``, a bar of a round length;
+        ``"colors"``, the colour of each value, for each channel; ``"legend"``, the colour of each label or channel;
+        ``"sides"``, the sides of the patient (R, L, A, P, S, I).
     **settings
         Settings over those of `scene`, as for `Scene`.
 
@@ -66,7 +70,7 @@ class View:
     """
 
     # Settings are changed by `set`: to assign one would do nothing.
-    __slots__ = ("__weakref__", "_inputs", "_native", "_scene", "_volume")
+    __slots__ = ("__weakref__", "_annotate", "_inputs", "_native", "_scene", "_volume")
 
     def __init__(
         self,
@@ -81,13 +85,15 @@ class View:
         memory: int | str | None = None,
         progress: bool = True,
         index: str | os.PathLike[str] | None = None,
+        annotate: str | Sequence[str] = (),
         **settings: Any,
     ) -> None:
         volume, look = _what_and_how(source, spacing, labels, scene, settings, memory, progress, index)
         if side is not None:
             look = look.seen_from(volume, side)
         self._volume, self._scene = volume, look
-        self._native = native.View(volume._native, look._native, backend, adapter)
+        self._annotate = names(annotate)
+        self._native = native.View(volume._native, look._native, backend, adapter, self._annotate)
         self._inputs = [volume._native.inputs]
 
     @property
@@ -227,7 +233,7 @@ class View:
             The pictures in their order.
         """
         frames, turn = _frames(count, frames), finite("turn", turn)
-        start = self._scene.explicit(self._volume, all_around=True)
+        start = self._scene.explicit(self._volume, all_around=True, annotate=self._annotate)
         return self._turns(start, frames, turn / count)
 
     def _turns(self, start: Scene, frames: range, step: float) -> Iterator[Image]:
@@ -322,8 +328,8 @@ def render(source: Any, **arguments: Any) -> Image:
     source
         What is drawn: an array ``[z, y, x]``, an image of SimpleITK or nibabel, a path, a `Volume` or a `Scene`.
     **arguments
-        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, `progress`, `index`, and
-        settings.
+        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, `progress`, `index`,
+        `annotate`, and settings.
 
     Returns
     -------

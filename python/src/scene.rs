@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use sheetsplat::annotate::{Annotation, layout};
 use sheetsplat::appearance::Preset;
 use sheetsplat::scene::VolumeSource;
 use sheetsplat::volume::{Inputs, Outputs, PatientSide};
@@ -92,13 +93,17 @@ impl Scene {
         Ok(Volume(volume, inputs))
     }
 
-    /// The scene with everything stated that depends on the volume; `all_around` for a camera that turns.
-    fn explicit(&self, py: Python<'_>, volume: &Volume, all_around: bool) -> PyResult<Self> {
+    /// The scene with everything stated that depends on the volume; `all_around` for a camera that turns, `annotate` for words beside its pictures.
+    fn explicit(&self, py: Python<'_>, volume: &Volume, all_around: bool, annotate: Vec<String>) -> PyResult<Self> {
+        let annotations = annotations(&annotate)?;
         let (scene, volume) = (self.scene.clone(), volume.0.clone());
         let explicit = detached(py, move || {
             let volume = volume.sample();
             scene.check_volume(volume)?;
-            Ok::<_, Raised>(if all_around { scene.explicit_all_around(volume) } else { scene.explicit(volume) })
+            let layout = (!annotations.is_empty()).then(|| layout(&annotations, &scene, volume)).transpose()?;
+            let beside = layout.as_ref().map_or_else(|| scene.clone(), |layout| layout.scene(&scene));
+            let stated = if all_around { beside.explicit_all_around(volume) } else { beside.explicit(volume) };
+            Ok::<_, Raised>(layout.map_or_else(|| stated.clone(), |layout| layout.whole(&stated)))
         })?;
         Ok(self.derived(explicit)?)
     }
@@ -155,4 +160,9 @@ impl Scene {
 #[pyfunction]
 pub(crate) fn presets() -> [&'static str; Preset::ALL.len()] {
     Preset::ALL.map(|(name, _)| name)
+}
+
+/// The annotations of some names.
+pub(crate) fn annotations(names: &[String]) -> Result<Vec<Annotation>, Raised> {
+    names.iter().map(|name| name.parse().map_err(|error: sheetsplat::SettingError| Raised::from(error))).collect()
 }

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use numpy::PyArray3;
 use pyo3::prelude::*;
+use sheetsplat::annotate::{Annotation, Layout, layout};
 use sheetsplat::golden::Subject;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions, HeadlessView};
 use sheetsplat::scene::OpenVolume;
@@ -13,7 +14,7 @@ use crate::error::{Raised, forked, setting};
 use crate::image;
 use crate::part::{Part, window};
 use crate::process::{detached, is_forked, may_commit};
-use crate::scene::Scene;
+use crate::scene::{Scene, annotations};
 use crate::volume::Volume;
 
 /// A picture's pixels, its statistics as JSON, and the adapter and driver that made it.
@@ -26,6 +27,7 @@ pub(crate) struct View(Arc<Shared>);
 /// A view, shared with a picture that nobody waits for any more.
 struct Shared {
     headless: Arc<Headless>,
+    annotations: Vec<Annotation>,
     current: Mutex<Current>,
     /// The process that made it, without which a device, and the threads that read a volume while it is drawn, are gone.
     bound_to: Option<u32>,
@@ -34,6 +36,8 @@ struct Shared {
 /// What a view draws next.
 struct Current {
     view: HeadlessView,
+    /// The words beside its pictures, if there are any.
+    layout: Option<Layout>,
     /// Width and height of its pictures.
     size: [u32; 2],
     /// The milliseconds that the last change of the scene took.
@@ -56,7 +60,15 @@ impl Shared {
 #[pymethods]
 impl View {
     #[new]
-    fn new(py: Python<'_>, volume: &Volume, scene: &Scene, backend: &str, adapter: Option<String>) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        volume: &Volume,
+        scene: &Scene,
+        backend: &str,
+        adapter: Option<String>,
+        annotate: Vec<String>,
+    ) -> PyResult<Self> {
+        let annotations = annotations(&annotate)?;
         let backend: Backend = backend.parse().map_err(|allowed: String| {
             setting("backend", &format!("{backend:?}"), allowed.trim_start_matches("allowed: "))
         })?;
@@ -65,12 +77,13 @@ impl View {
         let view = detached(py, move || {
             let headless = headless(backend, adapter, &scene)?;
             let start = Instant::now();
+            let (layout, scene) = worded(&annotations, volume.sample(), scene)?;
             let view = headless.view(volume, &scene)?;
-            let current = Current { view, size: size(&scene), prepare_ms: milliseconds_since(start) };
+            let current = Current { view, layout, size: size(&scene), prepare_ms: milliseconds_since(start) };
             let current = Mutex::new(current);
             let is_bound = is_streamed || headless.backend() == Backend::Gpu;
             let bound_to = is_bound.then(std::process::id);
-            Ok(Shared { headless, current, bound_to })
+            Ok(Shared { headless, annotations, current, bound_to })
         })?;
         Ok(Self(Arc::new(view)))
     }
@@ -82,11 +95,14 @@ impl View {
             shared.check_process()?;
             let (mut current, start) = (shared.lock(), Instant::now());
             let before = current.view.scene().clone();
+            let volume = current.view.volume();
+            let (layout, scene) = worded(&shared.annotations, volume.sample(), scene)?;
             shared.headless.set_scene(&mut current.view, &scene)?;
             if !may_commit() {
                 shared.headless.set_scene(&mut current.view, &before)?;
                 return Ok(());
             }
+            current.layout = layout;
             current.size = size(&scene);
             current.prepare_ms = milliseconds_since(start);
             Ok(())
@@ -107,6 +123,10 @@ impl View {
             let mut current = shared.lock();
             let mut rendering = shared.headless.draw(&mut current.view).map_err(Raised::from)?;
             rendering.stats.prepare_ms = std::mem::take(&mut current.prepare_ms);
+            if let Some(layout) = &current.layout {
+                let volume = current.view.volume();
+                rendering.image = layout.draw(&rendering.image, current.view.scene(), volume.sample());
+            }
             let stats = serde_json::to_string(&rendering.stats);
             Ok((rendering, stats))
         })?;
@@ -126,6 +146,9 @@ impl View {
         let (drawn, stats) = detached(py, move || {
             shared.check_process()?;
             let mut current = shared.lock();
+            if current.layout.is_some() {
+                return Err(setting("annotate", "words with a part of a picture", "no words beside parts"));
+            }
             let window = window(current.size, slabs, region);
             let (drawn, mut stats) = shared.headless.draw_part(&mut current.view, &window).map_err(Raised::from)?;
             stats.prepare_ms = std::mem::take(&mut current.prepare_ms);
@@ -134,6 +157,22 @@ impl View {
         let stats = stats.map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;
         Ok((Part(Arc::new(drawn)), stats))
     }
+}
+
+/// The words beside a scene's pictures, and the scene of the pictures beside them; without words, the scene itself.
+fn worded(
+    annotations: &[Annotation],
+    volume: &sheetsplat::Volume,
+    scene: sheetsplat::Scene,
+) -> Result<(Option<Layout>, sheetsplat::Scene), Raised> {
+    if annotations.is_empty() {
+        return Ok((None, scene));
+    }
+    scene.check()?;
+    scene.check_volume(volume)?;
+    let layout = layout(annotations, &scene, volume)?;
+    let beside = layout.scene(&scene).explicit(volume);
+    Ok((Some(layout), beside))
 }
 
 fn size(scene: &sheetsplat::Scene) -> [u32; 2] {

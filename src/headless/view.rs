@@ -75,8 +75,8 @@ impl HeadlessView {
         }
     }
 
-    /// The volume.
-    pub(super) fn volume(&self) -> OpenVolume {
+    /// The volume that it shows.
+    pub fn volume(&self) -> OpenVolume {
         match &self.backend {
             #[cfg(feature = "gpu")]
             ViewBackend::Gpu(view) => view.volume().volume().clone().into(),

@@ -22,6 +22,8 @@ pub(super) struct Loaded<T: Voxel> {
     pub(super) spacing: Option<DVec3>,
     /// The unit of the spacing, if the file states it.
     pub(super) unit: Option<String>,
+    /// The unit of the values, if the file states it.
+    pub(super) value_unit: Option<String>,
     /// The orientation, if the file states it.
     pub(super) orientation: Option<Orientation>,
     /// The colours that the file assigns to values, in ascending order of values.
@@ -62,12 +64,13 @@ impl<T: Voxel> Loaded<T> {
         let (label_names, series, channel_names) = (BTreeMap::new(), Series::default(), Vec::new());
         let (spacing, unit, orientation, palette) = (None, None, None, None);
         let (time_names, series_names) = (Vec::new(), Vec::new());
-        let (displays, levels) = (Vec::new(), None);
+        let (displays, levels, value_unit) = (Vec::new(), None, None);
         Self {
             dims,
             kind,
             spacing,
             unit,
+            value_unit,
             orientation,
             palette,
             label_names,
@@ -90,6 +93,7 @@ impl<T: Voxel> Loaded<T> {
             encoding: Some(Encoding { format, sample_type: self.kind, channels, times: series.times }),
             spacing: *spacing,
             unit: unit.clone(),
+            value_unit: self.value_unit.clone(),
             orientation: *orientation,
             palette: palette.clone(),
             label_names: label_names.clone(),

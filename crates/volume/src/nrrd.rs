@@ -51,7 +51,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let spacing = lattice.map(|lattice| lattice.spacing);
     let series = axes.series;
     let (label_names, palette) = (header.label_names(), header.palette());
-    let loaded = Loaded { spacing, unit, orientation, label_names, palette, series, ..loaded };
+    let value_unit = header.value_unit();
+    let loaded = Loaded { spacing, unit, value_unit, orientation, label_names, palette, series, ..loaded };
     match lattice {
         Some(lattice) => lattice.straighten(path, DIRECTIONS, loaded, access),
         None => Ok(loaded),
@@ -205,6 +206,12 @@ impl Header {
     fn unit(&self) -> Option<String> {
         let names = self.0.get("space units").or(self.0.get("units"))?.split('"').skip(1).step_by(2);
         unit::common(names)
+    }
+
+    /// The unit of the values.
+    fn value_unit(&self) -> Option<String> {
+        let stated = self.0.get("sample units")?.trim().trim_matches('"');
+        (!stated.is_empty()).then(|| stated.to_owned())
     }
 
     /// The names of segments, as 3D Slicer writes them: `Segment0_LabelValue:=3`, `Segment0_Name:=liver`.

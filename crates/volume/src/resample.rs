@@ -132,7 +132,7 @@ impl Volume {
             (0..count).into_par_iter().map(|index| color(place(index))).collect()
         });
         let resampled = Self::new(key, dims, grid.spacing(), values)?;
-        let Self { label_names, unit, encoding, palette, channel_name, display, .. } = self;
+        let Self { label_names, unit, value_unit, encoding, palette, channel_name, display, .. } = self;
         let orientation = grid.orientation().copied();
         Ok(Self {
             colors,
@@ -140,6 +140,7 @@ impl Volume {
             is_label_map: resampling == Resampling::Nearest,
             label_names,
             unit,
+            value_unit,
             encoding,
             palette,
             channel_name,

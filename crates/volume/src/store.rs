@@ -100,6 +100,8 @@ pub struct StoreFacts {
     pub spacing: Option<DVec3>,
     /// The name of the world unit.
     pub unit: Option<String>,
+    /// The unit of the values.
+    pub value_unit: Option<String>,
     /// How the volume lies in the patient.
     pub orientation: Option<Orientation>,
     /// The colours (red, green and blue in [0, 1]) of values, in ascending order.

@@ -38,6 +38,7 @@ pub struct Volume {
     pub(super) is_label_map: bool,
     pub(super) orientation: Option<Orientation>,
     pub(super) unit: Option<String>,
+    pub(super) value_unit: Option<String>,
     pub(super) encoding: Option<Encoding>,
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
     pub(super) channel_name: Option<String>,
@@ -59,12 +60,21 @@ impl PartialEq for Volume {
     /// Two holes compare as equal.
     fn eq(&self, other: &Self) -> bool {
         let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette, .. } = other;
-        let Self { colors, channel_name, display, further, levels, level, .. } = other;
+        let Self { colors, channel_name, value_unit, display, further, levels, level, .. } = other;
         let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
-        let channels = (colors, channel_name, display, further, levels, level);
+        let channels = (colors, channel_name, value_unit, display, further, levels, level);
         let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
+        let own = (
+            &self.colors,
+            &self.channel_name,
+            &self.value_unit,
+            &self.display,
+            &self.further,
+            &self.levels,
+            &self.level,
+        );
         facts == (grid, holes, labels, label_names, orientation, unit, encoding, palette)
-            && channels == (&self.colors, &self.channel_name, &self.display, &self.further, &self.levels, &self.level)
+            && channels == own
             && self.values().iter().zip(values.as_slice()).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
     }
 }
@@ -149,6 +159,7 @@ impl Volume {
             is_label_map: false,
             orientation: None,
             unit: None,
+            value_unit: None,
             encoding: None,
             palette: None,
             channel_name: None,
@@ -195,9 +206,10 @@ impl Volume {
 
     /// The same volume with what its file states beside its grid and values.
     pub(super) fn stating(self, origin: &str, facts: StoreFacts) -> Result<Self, VolumeError> {
-        let StoreFacts { encoding, spacing: _, unit, orientation, palette, .. } = facts;
+        let StoreFacts { encoding, spacing: _, unit, value_unit, orientation, palette, .. } = facts;
         let StoreFacts { label_names, channel_name, display, time_names, series_names, .. } = facts;
-        Self { encoding, unit, palette, label_names, channel_name, display, time_names, series_names, ..self }
+        let volume = Self { encoding, unit, value_unit, palette, label_names, channel_name, display, ..self };
+        Self { time_names, series_names, ..volume }
             .with_orientation(origin, orientation)
     }
 
@@ -255,6 +267,16 @@ impl Volume {
     /// The same volume with another world unit, by its name or symbol: `micron` and `um` both become `µm`. `none` and `pixel` mean no unit.
     pub fn with_unit(self, name: &str) -> Self {
         Self { unit: unit::unit(name), ..self }
+    }
+
+    /// The unit of the values, if the file states it: `HU`, or whatever else it states.
+    pub fn value_unit(&self) -> Option<&str> {
+        self.value_unit.as_deref()
+    }
+
+    /// The same volume with another unit of its values.
+    pub fn with_value_unit(self, unit: Option<String>) -> Self {
+        Self { value_unit: unit, ..self }
     }
 
     /// How the volume lies in a patient, if known.

@@ -5,7 +5,6 @@ mod adapters;
 mod annotate;
 mod arguments;
 mod bench;
-mod canvas;
 mod compare;
 #[cfg(target_os = "linux")]
 mod desktop;

@@ -64,7 +64,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     look::tell_choices(progress, &input.name, &scene, volume.sample());
     let start = Instant::now();
-    let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
+    let (words, scene) = arguments.annotate.settled(input, volume.sample(), &scene, Scene::explicit)?;
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
     let window = arguments.part.window(&scene);
     // Like a frame of `orbit`, a part is drawn once.
@@ -74,7 +74,6 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         tell(progress, &format!("{}: kept, drawn before", output.display()));
         return Ok(());
     }
-    let overlay = arguments.annotate.overlay(&scene, volume.sample())?;
     let is_streamed = matches!(volume, OpenVolume::Streamed(_));
     let bar = Progress::of_chunks(progress);
     let volume = bar.watch(volume);
@@ -84,9 +83,9 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
             (part.encode(output)?, stats)
         }
         None => {
-            let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume, &scene);
-            let Rendering { mut image, stats } = rendering.map_err(|error| input.failure(error))?;
-            overlay.draw(&mut image);
+            let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume.clone(), &scene);
+            let Rendering { image, stats } = rendering.map_err(|error| input.failure(error))?;
+            let image = words.draw(image, &scene, volume.sample());
             (image.encode(output, arguments.depth.into())?, stats)
         }
     };
@@ -101,7 +100,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         files.push((path, (json + "\n").into_bytes()));
     }
     if let Some(path) = save_scene {
-        files.push((path, scene_file(&scene, path)?));
+        files.push((path, scene_file(&words.whole(&scene), path)?));
     }
     if arguments.profile && stats.stages_ms.is_empty() {
         log::warn!("--profile: found no timestamp queries on {}", stats.adapter);

@@ -58,11 +58,19 @@ pub(super) struct Image {
     table: Option<Table>,
     /// The colours of values, if these are indices.
     pub(super) palette: Option<Palette>,
+    /// The unit of the rescaled values.
+    pub(super) value_unit: Option<String>,
     pub(super) frames: Vec<Frame>,
     codec: Codec,
     data: PixelData,
     /// All native pixels, if the file is deflated.
     inflated: Option<Vec<u8>>,
+}
+
+/// The unit that RescaleType names; that of CT is HU unless it says otherwise (DICOM PS3.3 C.11.1.1.2). `US` means unspecified.
+fn value_unit(data: &Dataset) -> Option<String> {
+    let of_ct = || (data.text(tags::MODALITY).as_deref() == Some("CT")).then(|| "HU".to_owned());
+    data.text(tags::RESCALE_TYPE).or_else(of_ct).filter(|unit| unit != "US")
 }
 
 /// The pixel format of every frame of an image.
@@ -134,6 +142,7 @@ impl Image {
         pixels.check(&data, tag, &pixel_data, count, codec)?;
         let (frames, assumed) = frames::read(&data, count)?;
         let is_signed = matches!(pixels.kind, SampleType::I8 | SampleType::I16 | SampleType::I32);
+        let value_unit = value_unit(&data);
         let has_palette = data.text(tags::PHOTOMETRIC).as_deref() == Some(INDICES);
         let palette = has_palette.then(|| palette::read(&data, is_signed)).transpose()?;
         let table = data.items(tags::MODALITY_LUT).first().map(|item| Table::read(item, is_signed)).transpose()?;
@@ -155,6 +164,7 @@ impl Image {
             pixels,
             table: table.filter(|_| pixels.samples == 1),
             palette,
+            value_unit,
             codec,
             data: pixel_data,
             inflated,

@@ -149,9 +149,11 @@ fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Lo
     }
     let palette = first.palette.clone().filter(|_| is_shared && !is_rescaled);
     let Stacks { channels: channel_names, times: time_names, .. } = stacks;
+    let value_unit = first.value_unit.clone();
     let loaded = Loaded {
         spacing: Some(lattice.spacing),
         unit,
+        value_unit,
         orientation,
         palette,
         series,

@@ -17,7 +17,7 @@ use sheetsplat::image::output::Target;
 use sheetsplat::internals::fingerprint;
 use sheetsplat::scene::{OpenVolume, Scene};
 
-use crate::annotate::{Annotate, Overlay};
+use crate::annotate::{Annotate, Words};
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, parse_range, scene_file};
 use crate::failure::Failure;
 use crate::outputs::{self, Outputs};
@@ -169,7 +169,7 @@ struct Shown<'a> {
     /// With everything stated that depends on the volume, at the first time.
     scene: Scene,
     times: Option<Range<u32>>,
-    overlay: Overlay,
+    words: Words,
     outputs: &'a Outputs,
     /// Whether frames that were drawn before may be kept, for which their hashes are needed.
     is_resumed: bool,
@@ -191,9 +191,8 @@ impl<'a> Shown<'a> {
             let allowed = format!("within 0..{count}, the times of {}", input.name);
             return Err(Failure::Input(format!("--time: found {start}..{end}, allowed: {allowed}")));
         }
-        let scene = input.settled(volume.sample(), &scene, Scene::explicit_all_around)?;
-        let overlay = annotate.overlay(&scene, volume.sample())?;
-        Ok((Self { scene, times, overlay, outputs, is_resumed }, volume))
+        let (words, scene) = annotate.settled(input, volume.sample(), &scene, Scene::explicit_all_around)?;
+        Ok((Self { scene, times, words, outputs, is_resumed }, volume))
     }
 
     /// The time that a frame shows: all times take turns over all frames.
@@ -211,7 +210,7 @@ impl<'a> Shown<'a> {
         }
         hash.update(fingerprint(volume, &self.scene)?.as_bytes());
         hash.update(&[u8::from(depth == Depth::Sixteen)]);
-        self.overlay.add_to(&mut hash);
+        self.words.add_to(&mut hash, &self.scene, volume.sample());
         Ok(hash)
     }
 
@@ -254,15 +253,16 @@ impl<'a> Shown<'a> {
                 current.view = Some(headless.view(volume, scene).map_err(|error| input.failure(error))?);
             }
             let Some(view) = &mut current.view else { continue };
-            view.set_camera(scene.camera.turned(angle)).map_err(|error| input.failure(RenderError::from(error)))?;
-            let mut rendering = headless.draw(view).map_err(|error| input.failure(error))?;
-            self.overlay.draw(&mut rendering.image);
-            take(frame, shown, &rendering.image)?;
+            let turned = Scene { camera: scene.camera.turned(angle), ..scene.clone() };
+            view.set_camera(turned.camera).map_err(|error| input.failure(RenderError::from(error)))?;
+            let rendering = headless.draw(view).map_err(|error| input.failure(error))?;
+            let image = self.words.draw(rendering.image, &turned, view.volume().sample());
+            take(frame, shown, &image)?;
             log_frame(&format!("frame {frame}"), &rendering.stats);
             progress.step();
         }
         match save_scene {
-            Some(path) => outputs::write(&[(path, scene_file(scene, path)?)], &[]),
+            Some(path) => outputs::write(&[(path, scene_file(&self.words.whole(scene), path)?)], &[]),
             None => Ok(()),
         }
     }

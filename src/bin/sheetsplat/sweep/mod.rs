@@ -158,13 +158,11 @@ fn draw(
             Some((_, volume)) => volume,
             None => input.open_volume(&scene, outputs)?,
         };
-        let scene = input.settled(volume.sample(), &scene, Scene::explicit)?;
-        let overlay = annotate.overlay(&scene, volume.sample())?;
-        let mut rendering =
+        let (words, scene) = annotate.settled(input, volume.sample(), &scene, Scene::explicit)?;
+        let rendering =
             headless.render_volume(progress.watch(volume.clone()), &scene).map_err(|error| input.failure(error))?;
         log_frame(&label.join(", "), &rendering.stats);
-        overlay.draw(&mut rendering.image);
-        tiles.push(Tile { image: rendering.image, label });
+        tiles.push(Tile { image: words.draw(rendering.image, &scene, volume.sample()), label });
         progress.step();
         last = Some((scene, volume));
     }
