@@ -278,5 +278,6 @@ fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFun
     scene.check_volume(sample)?;
     check(scene)?;
     scene.check_streamed(volume)?;
-    Ok((scene.settled(sample), scene.resolve(sample)))
+    let settled = scene.settled(sample);
+    Ok((Scene { splatting: settled.splatting.streamed(), ..settled }, scene.resolve(sample)))
 }
