@@ -118,7 +118,8 @@ impl Search {
     }
 
     /// Looks at the points of a plane as [`Frame::choose`] does.
-    #[inline(always)]
+    // Not inlined, so that it is compiled once for every instruction set.
+    #[inline(never)]
     fn look<S: Simd>(
         &mut self,
         simd: S,
@@ -130,7 +131,10 @@ impl Search {
     ) {
         self.become_plane(number);
         self.bricks += frame.draw_bricks(simd, &self.plane, lanes, at);
-        frame.choose_from(simd, looks, &mut self.plane, lanes, at, chosen);
+        simd.vectorize(
+            #[inline(always)]
+            || frame.choose_from(simd, looks, &mut self.plane, lanes, at, chosen),
+        );
     }
 
     fn become_plane(&mut self, number: i32) {
