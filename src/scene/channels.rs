@@ -68,7 +68,7 @@ impl Scene {
         let has_opacity = settings.opacity.is_some();
         // What the settings state in full needs no look at the values.
         let shows_labels = !(has_color && has_opacity)
-            && !settings.preset.is_some_and(Preset::is_projection)
+            && settings.preset.is_none_or(|preset| !preset.is_projection())
             && categories::is_label_map(channel);
         let chosen = |preset: Option<Preset>| match preset {
             _ if shows_labels => labels_of_several(channel, preset),
