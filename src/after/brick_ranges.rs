@@ -73,6 +73,14 @@ impl BrickRanges {
         Self { grid: *grid, ranges: along_z }
     }
 
+    /// The range around the brick of a voxel.
+    #[inline(always)]
+    pub fn at(&self, voxel: [u32; 3]) -> [f32; 2] {
+        let [nx, ny, _] = self.grid.dims.to_array().map(|n| n.div_ceil(SIDE));
+        let [x, y, z] = voxel.map(|n| n / SIDE);
+        self.ranges[(x + nx * (y + ny * z)) as usize]
+    }
+
     /// Where they lie in memory.
     #[cfg(test)]
     pub(crate) fn place(&self) -> *const () {

@@ -11,7 +11,7 @@ use super::{categories, channel_display, xray};
 #[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::settings::shading::Shading;
-use crate::settings::splatting::{Compositing, Splatting};
+use crate::settings::splatting::{Compositing, Interpolation, Splatting};
 use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::{ValueSlice, Volume};
 
@@ -88,15 +88,20 @@ impl Preset {
         }
     }
 
-    /// Whether images gain by classification after splatting (SPEC §9), which is then the default. Projections and unshaded haze have no
-    /// edges that it would sharpen, and numbers of labels cannot be interpolated.
-    pub(crate) fn is_classified_after(self) -> bool {
-        !matches!(self, Self::Xray | Self::Mip | Self::Confocal | Self::Labels | Self::Fusion)
+    /// How values are interpolated after splatting: projections of the greatest values keep them.
+    pub(crate) fn interpolation(self) -> Interpolation {
+        if self == Self::Mip { Interpolation::Auto } else { Interpolation::Smooth }
     }
 
-    /// Whether a label map among several channels keeps its labels' colours: not in projections, which add up or compare amounts.
-    pub(crate) fn keeps_labels(self) -> bool {
-        !matches!(self, Self::Xray | Self::Mip)
+    /// Whether images gain by classification after splatting (SPEC §9), which is then the default. Sums and unshaded haze have no
+    /// edges that it would sharpen, and numbers of labels cannot be interpolated.
+    pub(crate) fn is_classified_after(self) -> bool {
+        !matches!(self, Self::Xray | Self::Confocal | Self::Labels | Self::Fusion)
+    }
+
+    /// Whether amounts are added up or compared: a label map among several channels then keeps no colours, and on a light background all are dark, as on film.
+    pub(crate) fn is_projection(self) -> bool {
+        matches!(self, Self::Xray | Self::Mip)
     }
 
     /// The transfer function for a volume. Those for CT are in Hounsfield units: the values themselves if one in a thousand is below -100;

@@ -45,8 +45,8 @@ impl Layer {
     fn update(&mut self, transfer: &TransferFunction, (old, new): (&Scene, &Scene)) -> Result<(), RenderError> {
         let is_same_clip = old.clip == new.clip;
         let (old, splatting) = (&old.splatting, &new.splatting);
-        let is_same_kernel = (old.radius, old.falloff, old.interpolation)
-            == (splatting.radius, splatting.falloff, splatting.interpolation);
+        let is_same_kernel =
+            (old.radius, old.falloff, old.is_exact()) == (splatting.radius, splatting.falloff, splatting.is_exact());
         let is_same_function = *transfer == self.transfer;
         match &mut self.list {
             List::Before(..) if splatting.classification == Classification::Before => {

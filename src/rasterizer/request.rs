@@ -30,7 +30,7 @@ use crate::pass::lanes::{lanes, least_lanes};
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::{Classification, Interpolation, Rasterizer, Splatting};
+use crate::settings::splatting::{Classification, Rasterizer, Splatting};
 use crate::settings::window::Window;
 
 /// A frame of a view, in the channels that share sheets (SPEC §10).
@@ -87,9 +87,9 @@ impl After {
     ) -> Result<Self, RenderError> {
         let splatting = &scene.splatting;
         let planes = PlaneGeometry::new(seen, volume.grid());
-        let coefficients = match splatting.interpolation {
-            Interpolation::Smooth => None,
-            Interpolation::Exact => Some(volume.gpu_volume().coefficients((splatting.radius, splatting.falloff))?),
+        let coefficients = match splatting.is_exact() {
+            false => None,
+            true => Some(volume.gpu_volume().coefficients((splatting.radius, splatting.falloff))?),
         };
         let numbers = coefficients.as_ref().map_or_else(|| volume.gpu_volume().numbers(), |exact| &exact.numbers);
         let numbers = numbers[layer.channels.clone()].to_vec();

@@ -2,9 +2,11 @@
 
 use std::borrow::Cow;
 
+use glam::DVec3;
+
 use super::{Channel, Scene, TransferSettings, VolumeSource};
 use crate::appearance::{Preset, categories, channel_color, channel_display, labels_of_several, one_of_several};
-use crate::settings::transfer_function::TransferFunction;
+use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::Volume;
 
 impl Scene {
@@ -40,7 +42,7 @@ impl Scene {
     /// The complete transfer function for a volume and all of its channels ([`TransferSettings::resolve`]); an invisible channel has no opacity.
     /// Where a volume has several channels, those whose colours are not stated have their files', or else a colour each (magenta and green, then cyan,
     /// magenta and yellow, …); those whose opacities are not, a window of their values each. Label maps among them keep their labels' colours, unless a
-    /// preset shows projections.
+    /// preset shows projections. On a light background projections of one channel are dark, as on film.
     pub fn resolve(&self, volume: &Volume) -> TransferFunction {
         if self.is_fitting() {
             return self.fitted(volume).resolve(volume);
@@ -60,14 +62,17 @@ impl Scene {
     fn transfer_of(&self, number: usize, volume: &Volume, channel: &Volume) -> TransferFunction {
         let settings = &self.settings_of(number).transfer;
         let count = volume.channels().count();
-        if count == 1 {
-            return settings.resolve(channel);
-        }
         let has_color = settings.color.is_some() || settings.colormap.is_some();
+        if count == 1 {
+            let transfer = settings.resolve(channel);
+            let is_film = !has_color && settings.preset.is_some_and(Preset::is_projection) && self.image.is_light();
+            let black = || Ramp::through(vec![(0.0, DVec3::ZERO)]);
+            return if is_film { TransferFunction { color: black(), ..transfer } } else { transfer };
+        }
         let has_opacity = settings.opacity.is_some();
         // What the settings state in full needs no look at the values.
         let shows_labels = !(has_color && has_opacity)
-            && settings.preset.is_none_or(Preset::keeps_labels)
+            && settings.preset.is_none_or(|preset| !preset.is_projection())
             && categories::is_label_map(channel);
         let chosen = |preset: Option<Preset>| match preset {
             _ if shows_labels => labels_of_several(channel, preset),

@@ -11,6 +11,15 @@ pub struct ImageSettings {
     pub background: [f64; 4],
 }
 
+impl ImageSettings {
+    /// Whether the background is nearer to white than to black.
+    pub(super) fn is_light(&self) -> bool {
+        let [red, green, blue, alpha] = self.background;
+        // Rec. 709.
+        (0.2126 * red + 0.7152 * green + 0.0722 * blue) * alpha > 0.5
+    }
+}
+
 /// A background with straight alpha, premultiplied (SPEC §5).
 pub(crate) fn premultiplied([red, green, blue, alpha]: [f64; 4]) -> [f32; 4] {
     [red * alpha, green * alpha, blue * alpha, alpha].map(|channel| channel as f32)

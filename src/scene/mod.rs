@@ -207,7 +207,7 @@ impl Scene {
     }
 
     /// Whether values are classified before or after splatting, for a volume (SPEC §9): as stated, or with [`Classification::Auto`] after
-    /// it where the transfer function comes from a preset (except `xray`, `mip`, `confocal` and `labels`) or is chosen for the volume, unless
+    /// it where the transfer function comes from a preset (except `xray`, `confocal` and `labels`) or is chosen for the volume, unless
     /// another setting excludes that or the volume, or one of several channels, is a label map ([`categories`]).
     pub fn classification(&self, volume: &Volume) -> Classification {
         let splatting = &self.splatting;
@@ -223,7 +223,7 @@ impl Scene {
             match transfer.preset {
                 None | Some(Preset::None) => !transfer.states_more() && !categories::is_label_map(volume),
                 Some(preset) => {
-                    let may_be_labels = are_several && preset.is_classified_after() && preset.keeps_labels();
+                    let may_be_labels = are_several && preset.is_classified_after() && !preset.is_projection();
                     preset.is_classified_after() && !(may_be_labels && categories::is_label_map(volume))
                 }
             }
@@ -285,6 +285,7 @@ impl Scene {
         root.finish()?;
         let splatting_of_preset = Splatting {
             compositing: preset.map_or(Splatting::default().compositing, Preset::compositing),
+            interpolation: preset.map_or(Splatting::default().interpolation, Preset::interpolation),
             classification: if states_transfer && preset.is_none_or(|preset| preset == Preset::None) {
                 Classification::Before
             } else {

@@ -15,7 +15,7 @@ pub(crate) const METHODS: &[(&str, Method)] = &[
 pub(crate) const CLASSIFICATIONS: &[(&str, Classification)] =
     &[("before", Classification::Before), ("after", Classification::After)];
 pub(super) const INTERPOLATIONS: &[(&str, Interpolation)] =
-    &[("smooth", Interpolation::Smooth), ("exact", Interpolation::Exact)];
+    &[("smooth", Interpolation::Smooth), ("exact", Interpolation::Exact), ("auto", Interpolation::Auto)];
 pub(super) const GRADIENTS: &[(&str, Gradient)] =
     &[("differences", Gradient::Differences), ("kernel", Gradient::Kernel)];
 pub(super) const FORMS: &[(&str, FootprintForm)] =

@@ -66,6 +66,8 @@ pub enum Classification {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Interpolation {
+    /// [`Self::Exact`] where the greatest or the least value of a ray is shown of a volume in memory and the kernel allows it, else [`Self::Smooth`].
+    Auto,
     /// The kernel's weighted mean of the voxels' values, which smooths them.
     Smooth,
     /// The weighted mean of coefficients for which every voxel keeps its exact value.
@@ -228,6 +230,28 @@ impl Splatting {
         self.check_after().is_ok()
     }
 
+    /// Whether voxels keep their exact values, in a volume in memory.
+    pub(crate) fn is_exact(&self) -> bool {
+        match self.interpolation {
+            Interpolation::Smooth => false,
+            Interpolation::Exact => true,
+            Interpolation::Auto => {
+                matches!(self.compositing, Compositing::Maximum | Compositing::Minimum) && self.allows_exact()
+            }
+        }
+    }
+
+    /// Whether coefficients of the kernel can give every voxel its value.
+    fn allows_exact(&self) -> bool {
+        Kernel::new(self.radius, self.falloff).min_discrete_response() >= MIN_RESPONSE
+    }
+
+    /// The settings for a volume that is streamed, whose voxels are interpolated as they are.
+    pub(crate) fn streamed(self) -> Self {
+        let is_auto = self.interpolation == Interpolation::Auto;
+        Self { interpolation: if is_auto { Interpolation::Smooth } else { self.interpolation }, ..self }
+    }
+
     /// Checks that the settings allow what of rays is looked at: whether anything is cut, and the opacity whose depth is asked for.
     ///
     /// # Errors
@@ -274,8 +298,7 @@ impl Splatting {
             let found = format!("{} with splatting.classification = \"after\"", self.falloff);
             return refused("splatting.falloff", found, &format!("at most {MAX_FALLOFF_AFTER} with it"));
         }
-        let response = || Kernel::new(self.radius, self.falloff).min_discrete_response();
-        if self.interpolation == Interpolation::Exact && response() < MIN_RESPONSE {
+        if self.interpolation == Interpolation::Exact && !self.allows_exact() {
             let Self { radius, falloff, .. } = self;
             let found = format!("\"exact\" with splatting.radius = {radius} and splatting.falloff = {falloff}");
             let allowed = "\"smooth\" with them, or a larger falloff (0.95 and above at radius 2)";

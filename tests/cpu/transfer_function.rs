@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DVec3, UVec3};
-use sheetsplat::scene::{Scene, TransferSettings};
+use sheetsplat::scene::{Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::{Ramp, RampError, TransferFunction};
 use sheetsplat::volume::Volume;
 
@@ -32,6 +32,26 @@ fn ramp_evaluation() {
     assert!(matches!(error, RampError::NotFinite { index: 1, position, .. } if position.is_nan()), "{error}");
     let error = Ramp::new(vec![(0.0, 0.0), (1.0, 0.0), (0.5, 1.0)]).unwrap_err();
     assert!(matches!(error, RampError::NotIncreasing { index: 2, position: 0.5, before: 1.0, .. }), "{error}");
+}
+
+/// Projections are white in the dark and black in the light, unless their colours are stated.
+#[test]
+fn projections_are_dark_on_a_light_background() {
+    for (preset, background, colors, is_dark) in [
+        ("xray", "[0,0,0,1]", "", false),
+        ("xray", "[1,1,1,1]", "", true),
+        ("mip", "[0.9,0.9,0.8,1]", "", true),
+        ("mip", "[1,1,1,0.2]", "", false),
+        ("mip", "[1,1,1,1]", "transfer.color=[[0,[1,1,1]]]", false),
+        ("confocal", "[1,1,1,1]", "", false),
+    ] {
+        let sets = [format!("preset={preset}"), format!("image.background={background}"), colors.to_owned()];
+        let sets: Vec<String> = sets.into_iter().filter(|set| !set.is_empty()).collect();
+        let scene = Scene::from_volume(VolumeSource::Builtin("head:16".to_owned()), &sets).unwrap();
+        let color = scene.resolve(&scene.load_volume().unwrap()).color;
+        let dark = color.points().iter().all(|(_, rgb)| *rgb == DVec3::ZERO);
+        assert_eq!(dark, is_dark, "{preset} on {background}: {color:?}");
+    }
 }
 
 #[test]

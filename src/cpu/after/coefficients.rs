@@ -23,7 +23,7 @@ use crate::lists::brick::{self, Brick, BrickList};
 use crate::lists::iso_range::ValueSet;
 use crate::scene::Scene;
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::{Compositing, Interpolation};
+use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{ValueSlice, Volume};
 
@@ -86,6 +86,8 @@ struct Shown {
     wanted: Vec<u32>,
     /// The least and the greatest number with an opacity, and the cells that can meet one; `None` where values without an opacity count too.
     cells: Option<([f32; 2], Cells)>,
+    /// Around the kernels of points of bricks' cells, where the greatest or the least value is chosen.
+    extremes: Option<BrickRanges>,
 }
 
 impl Coefficients {
@@ -94,13 +96,11 @@ impl Coefficients {
     pub(in crate::cpu) fn new(volume: &Volume, scene: &Scene) -> Result<Self, RenderError> {
         let splatting = &scene.splatting;
         let kernel = (splatting.radius, splatting.falloff);
-        let exact = match splatting.interpolation {
-            Interpolation::Smooth => None,
-            Interpolation::Exact => Some(coefficients::of_volume(volume, kernel)?),
-        };
+        let is_exact = splatting.is_exact();
+        let exact = if is_exact { Some(coefficients::of_volume(volume, kernel)?) } else { None };
         let all = exact.as_deref().map_or(volume.values(), ValueSlice::from);
         let numbers = Normalization::of(all.iter()).unwrap_or(Normalization::new([0.0; 2]));
-        let colors = Colors::new(volume, splatting.interpolation, kernel)?;
+        let colors = Colors::new(volume, is_exact, kernel)?;
         Ok(Self {
             numbers,
             exact,
@@ -183,12 +183,13 @@ impl Coefficients {
             Ranges { reaches, of_kernels, of_cells }
         });
         let (values, bearing) = (values_of(volume, transfer), Bearing::of(compositing));
-        let (listed, old_cells) = match old {
+        let (listed, old_cells, old_extremes) = match old {
             Some(old) => {
                 let is_same = (&old.values, old.bearing) == (&values, bearing);
-                (is_same.then_some((old.bricks, old.wanted)), old.cells.filter(|_| old.kernels == kernels))
+                let (is_same_kernel, listed) = (old.kernels == kernels, is_same.then_some((old.bricks, old.wanted)));
+                (listed, old.cells.filter(|_| is_same_kernel), old.extremes.filter(|_| is_same_kernel))
             }
-            None => (None, None),
+            None => (None, None, None),
         };
         let (bricks, wanted) = listed.unwrap_or_else(|| {
             let of_kernels = (&ranges.of_kernels, &ranges.reaches.0);
@@ -212,8 +213,14 @@ impl Coefficients {
                 (shown, cells)
             })
         });
+        let extremes = matches!(compositing, Compositing::Maximum | Compositing::Minimum).then(|| {
+            old_extremes.unwrap_or_else(|| {
+                let reach = kernels.0.min(grid.dims.as_dvec3()).max(DVec3::ONE).as_uvec3();
+                BrickRanges::new(grid, self.all(volume), reach)
+            })
+        });
         self.ranges = Some(ranges);
-        self.shown = Some(Shown { values, bearing, kernels, bricks, wanted, cells });
+        self.shown = Some(Shown { values, bearing, kernels, bricks, wanted, cells, extremes });
     }
 
     /// For the last view that was looked at, the bricks whose voxels may affect a slab with an opacity.
@@ -233,6 +240,11 @@ impl Coefficients {
     /// For the last view that was looked at, the bricks, as indices into the grid's, in whose cells rays may enter a slab with an opacity.
     pub(super) fn wanted(&self) -> &[u32] {
         self.shown.as_ref().map_or(&[], |shown| &shown.wanted)
+    }
+
+    /// The extremes around points of bricks; `None` unless the greatest or the least value is chosen.
+    pub(super) fn extremes(&self) -> Option<&BrickRanges> {
+        self.shown.as_ref().and_then(|shown| shown.extremes.as_ref())
     }
 
     /// Where values can meet an opacity; `None` where all values count.

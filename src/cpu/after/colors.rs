@@ -14,7 +14,6 @@ use crate::after::coefficients;
 use crate::cpu::count::bits;
 use crate::cpu::vector::LANES;
 use crate::error::RenderError;
-use crate::settings::splatting::Interpolation;
 use crate::volume::{Texel, Volume};
 
 /// Red, green, blue and A.
@@ -41,12 +40,8 @@ impl Colors {
     ///
     /// # Errors
     /// If no coefficients are found that interpolate the colours.
-    pub(super) fn new(
-        volume: &Volume,
-        interpolation: Interpolation,
-        kernel: (f64, f64),
-    ) -> Result<Option<Self>, RenderError> {
-        if interpolation == Interpolation::Smooth {
+    pub(super) fn new(volume: &Volume, is_exact: bool, kernel: (f64, f64)) -> Result<Option<Self>, RenderError> {
+        if !is_exact {
             return Ok(volume.colors().map(|_| Self::Smooth));
         }
         Ok(coefficients::of_colors(volume, kernel)?.map(Self::Exact))

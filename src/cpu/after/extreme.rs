@@ -48,6 +48,13 @@ impl Chosen {
         Self { best: vec![NOTHING; rows], middle: vec![[NOTHING; 2]; rows], colors }
     }
 
+    /// Which of eight pixels have chosen a point.
+    #[inline(always)]
+    pub(super) fn are_chosen<S: Simd>(&self, simd: S, [column, row]: [usize; 2]) -> u32 {
+        let weights = f32x8::from_slice(simd, &self.best[row].weight[column..column + LANES]);
+        weights.simd_gt(f32x8::splat(simd, 0.0)).to_bitmask() as u32
+    }
+
     pub(super) fn clear(&mut self) {
         self.best.fill(NOTHING);
         self.middle.fill([NOTHING; 2]);
@@ -137,7 +144,7 @@ impl Frame<'_> {
 
     /// Looks at the points of some of eight pixels on a plane.
     #[inline(always)]
-    fn choose_from<S: Simd>(
+    pub(super) fn choose_from<S: Simd>(
         &self,
         simd: S,
         looks: &Looks<'_>,

@@ -60,6 +60,8 @@ pub(in crate::cpu) struct Frame<'a> {
     /// By brick of a grid in memory: [`WANTED`], [`DRAWN`], or 0.
     drawn: Vec<AtomicU8>,
     pub(super) compositing: Compositing,
+    /// Whether values that are not chosen may be left out.
+    pub(super) is_bounded: bool,
     /// Numbers that differ by less count as equal.
     pub(super) hair: f32,
     /// Whether anything depends on gradients.
@@ -89,7 +91,7 @@ const WANTED: u8 = 1;
 const DRAWN: u8 = 2;
 
 /// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
-const HAIR_OF_RANGE: f32 = 2e-6;
+const HAIR_OF_RANGE: f32 = 1e-5;
 
 impl<'a> Frame<'a> {
     /// A channel's frame in a view, the one that the coefficients were looked at in.
@@ -142,6 +144,7 @@ impl<'a> Frame<'a> {
             rays: RayMode::within(&view, &grid, counted(&view, &scene.clip, &grid), surfaces),
             drawn,
             compositing: splatting.compositing,
+            is_bounded: splatting.culling,
             hair: HAIR_OF_RANGE * (numbers.range[1] - numbers.range[0]),
             needs_gradients: shading.enabled || has_gradient_opacity,
             has_gradient_opacity,
@@ -184,6 +187,9 @@ impl<'a> Frame<'a> {
         let first = &frames[0];
         let size = first.placement.view.size;
         let place = |frame: &Self| {
+            if frame.is_searched() {
+                return Vec::new();
+            }
             let mut placed = frame.placement.place(&frame.matter.wanted(), |number| frame.matter.bounds(number));
             placed.iter_mut().for_each(|placed| placed.channel = frame.channel as u32);
             placed
@@ -229,6 +235,11 @@ impl<'a> Frame<'a> {
         Drawing { content, counts, first_hits }
     }
 
+    /// Whether each pixel's ray is searched for the value that it chooses.
+    pub(super) fn is_searched(&self) -> bool {
+        is_choice(self.compositing) && matches!(self.matter, Matter::Whole { .. })
+    }
+
     /// The slabs whose sheets may hold anything in any channel.
     pub(super) fn touched(frames: &[Self]) -> Range<i32> {
         let touched = frames.iter().map(|frame| frame.touched.clone()).filter(|touched| !touched.is_empty());
@@ -247,11 +258,11 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// Records that a tile draws one of the grid's bricks.
-    pub(super) fn draw_brick(&self, brick: u32) {
-        if let Some(drawn) = self.drawn.get(brick as usize) {
-            drawn.store(DRAWN, Ordering::Relaxed);
-        }
+    /// Records that a tile draws one of the grid's bricks. Returns whether it is the first one to.
+    #[inline]
+    pub(super) fn draw_brick(&self, brick: u32) -> bool {
+        let Some(drawn) = self.drawn.get(brick as usize) else { return false };
+        drawn.load(Ordering::Relaxed) != DRAWN && drawn.swap(DRAWN, Ordering::Relaxed) != DRAWN
     }
 
     /// The points of a plane in a tile, given by its first pixel, and the plane's kernels; `None` at the eye and behind it.

@@ -9,6 +9,7 @@ use super::coefficients::Coefficients;
 use super::colors::ColorsOf;
 use super::differences::Differences;
 use super::held::Extent;
+use crate::after::brick_ranges::BrickRanges;
 use crate::after::normalization::Normalization;
 use crate::cpu::stream::Stream;
 use crate::lists::brick::{self, Brick};
@@ -84,6 +85,14 @@ impl<'a> Matter<'a> {
     pub(super) fn cells(&self) -> Option<&'a Cells> {
         match self {
             Self::Whole { coefficients, .. } => coefficients.cells(),
+            Self::Streamed { .. } => None,
+        }
+    }
+
+    /// The extremes of the coefficients that the values at points of bricks are means of, where the greatest or the least value is chosen.
+    pub(super) fn extremes(&self) -> Option<&'a BrickRanges> {
+        match self {
+            Self::Whole { coefficients, .. } => coefficients.extremes(),
             Self::Streamed { .. } => None,
         }
     }

@@ -25,6 +25,7 @@ mod matter;
 mod needs;
 mod place;
 mod planes;
+mod search;
 mod sheet;
 mod slab_integral;
 mod surface;

@@ -135,6 +135,14 @@ impl Placement {
         self.slab_step
     }
 
+    /// The number of a voxel's brick.
+    #[inline(always)]
+    pub(super) fn brick_of(&self, voxel: [u32; 3]) -> u32 {
+        let across = self.bricks();
+        let [x, y, z] = voxel.map(|n| n / brick::SIDE);
+        x + across.x * (y + across.y * z)
+    }
+
     /// The number of the grid's bricks along each axis.
     pub(super) fn bricks(&self) -> UVec3 {
         brick::bricks_per_axis(&self.grid)

@@ -13,6 +13,7 @@ use super::extreme::{Chosen, is_choice};
 use super::frame::Frame;
 use super::place::ScreenBox;
 use super::planes::Plane;
+use super::search::Search;
 use super::sheet::SlabSheet;
 use crate::cpu::bin::Placed;
 use crate::cpu::count::Tally;
@@ -49,6 +50,7 @@ pub(super) struct TileWalk<'a> {
     sheet: SlabSheet,
     buffers: Buffers,
     chosen: Chosen,
+    search: Search,
     tally: Tally,
 }
 
@@ -79,6 +81,7 @@ impl<'a> TileWalk<'a> {
             sheet: SlabSheet::new(),
             buffers: Buffers::new(),
             chosen: Chosen::new(frame.compositing, frame.field.has_colors()),
+            search: Search::new(frame.field.has_colors()),
             tally: Tally::default(),
         }
     }
@@ -96,7 +99,10 @@ impl<'a> TileWalk<'a> {
         self.buffers.clear();
         self.chosen.clear();
         self.tally = Tally::default();
-        if let Some(first) = bricks.peek().map(|placed| placed.first) {
+        if self.frame.is_searched() {
+            self.reset(origin, self.touched.start);
+            self.search(simd);
+        } else if let Some(first) = bricks.peek().map(|placed| placed.first) {
             self.reset(origin, first);
             self.walk(simd, first, &mut bricks);
             if is_choice(self.frame.compositing) {
@@ -105,6 +111,16 @@ impl<'a> TileWalk<'a> {
             }
         }
         (&self.buffers, &self.rays, self.tally)
+    }
+
+    /// Finds the values that the tile's pixels choose, and classifies them.
+    #[inline(always)]
+    fn search<S: Simd>(&mut self, simd: S) {
+        let Self { frame, rays, to_eye, buffers, chosen, search, open, tally, .. } = self;
+        let looks = Looks::new(self.origin, rays, to_eye);
+        search.choose(simd, frame, &looks, open, frame.matter.extremes().filter(|_| frame.is_bounded), chosen);
+        tally.bricks_visited = search.bricks;
+        frame.classify_chosen(simd, &looks, chosen, buffers);
     }
 
     /// The values that the tile's pixels chose, row by row; see [`Chosen::extremes`].

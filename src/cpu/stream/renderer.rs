@@ -278,7 +278,7 @@ fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFun
     scene.check_volume(sample)?;
     check(scene)?;
     scene.check_streamed(volume)?;
-    let scene = scene.settled(sample);
-    let transfer = scene.resolve(sample);
-    Ok((scene, transfer))
+    let settled = scene.settled(sample);
+    let transfer = settled.resolve(sample);
+    Ok((Scene { splatting: settled.splatting.streamed(), ..settled }, transfer))
 }

@@ -52,7 +52,8 @@ impl BoxedView {
     /// If a setting of the scene is invalid, or not supported for a volume that is streamed.
     pub(super) fn new(volume: StreamedVolume, scene: &Scene, backend: Backend) -> Result<Self, RenderError> {
         check(&volume, scene, backend)?;
-        let scene = scene.settled(&volume.sample);
+        let mut scene = scene.settled(&volume.sample);
+        scene.splatting = scene.splatting.streamed();
         Ok(Self { volume, scene, backend })
     }
 
@@ -71,6 +72,7 @@ impl BoxedView {
     pub(super) fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
         check(&self.volume, scene, self.backend)?;
         self.scene = scene.settled(&self.volume.sample);
+        self.scene.splatting = self.scene.splatting.streamed();
         Ok(())
     }
 

@@ -10,7 +10,6 @@ use super::low_pass::LowPass;
 use crate::error::RenderError;
 use crate::scene::Scene;
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::Interpolation;
 use crate::volume::{Grid, Volume};
 
 /// Where the sum of the weights is less than this, there is no value.
@@ -40,9 +39,9 @@ impl<'a> Field<'a> {
         let (radius, falloff) = (scene.splatting.radius, scene.splatting.falloff);
         let values = volume.values().iter().map(|value| f64::from(if value.is_finite() { value } else { f32::NAN }));
         let values: Vec<f64> = values.collect();
-        let coefficients = match scene.splatting.interpolation {
-            Interpolation::Smooth => values,
-            Interpolation::Exact => coefficients::exact(volume.grid(), &values, radius, falloff)?,
+        let coefficients = match scene.splatting.is_exact() {
+            false => values,
+            true => coefficients::exact(volume.grid(), &values, radius, falloff)?,
         };
         let colors = volume.colors().is_some().then(|| colors(volume, scene)).transpose()?;
         // `min` and `max` ignore NaN.
@@ -144,7 +143,7 @@ fn colors(volume: &Volume, scene: &Scene) -> Result<Vec<DVec4>, RenderError> {
     let is_hole = |index: u32| volume.values().at(index as usize).is_nan();
     let indices = 0..volume.values().len() as u32;
     let mut colors: Vec<DVec4> = indices.clone().filter_map(|index| volume.color(index)).collect();
-    if scene.splatting.interpolation == Interpolation::Exact {
+    if scene.splatting.is_exact() {
         for component in 0..4 {
             let own = |index: u32| if is_hole(index) { f64::NAN } else { colors[index as usize][component] };
             let numbers: Vec<f64> = indices.clone().map(own).collect();

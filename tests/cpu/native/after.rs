@@ -5,13 +5,14 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use sheetsplat::cpu;
 use sheetsplat::internals::reference::{self, Host};
-use sheetsplat::scene::Scene;
+use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::{
     Classification, Compositing, Gradient, Interpolation, LabelTables, Light, Method, Order, Projection, Ramp,
 };
 use sheetsplat::volume::{Labels, Volume};
 
 use crate::common::images::{bits, largest_difference};
+use crate::common::shared::shared;
 use crate::common::{BY_AMOUNTS, BY_MEANS, Random, SPACINGS, camera};
 use crate::native::{ROUNDING, draw, head, psnr, random_case, shown, twin};
 
@@ -175,6 +176,86 @@ fn values_chosen_and_surfaces_against_the_twin() {
         scene.clip.crop = Some([DVec3::new(-0.47, -0.41, -0.52) * half, DVec3::new(0.53, 0.46, 0.44) * half]);
     });
     println!("worst: {worst:.1} dB");
+}
+
+/// Values whose bounds show that they are not chosen are left out with `culling`, which changes no bit.
+#[test]
+fn bounds_change_no_byte_of_a_choice() {
+    let mut random = Random(48);
+    let mut left_out = 0;
+    for case in 0..60 {
+        let (mut volume, mut scene) = random_after(&mut random);
+        scene.splatting.compositing = [Compositing::Maximum, Compositing::Minimum][case % 2];
+        if case % 3 == 0 {
+            // Plateaus, and values that differ by about a hair.
+            let flat = |value: f32| (value / 64.0).floor() * 64.0 + 1e-3 * (value / 8.0).floor();
+            let values = volume.values().iter().map(flat).collect();
+            volume = Volume::new("plateaus", volume.dims(), volume.spacing(), values).unwrap();
+        }
+        let [all, bounded] = [false, true].map(|culling| {
+            scene.splatting.culling = culling;
+            draw(&volume, &scene)
+        });
+        assert_eq!(bits(&bounded.image), bits(&all.image), "case {case}: {scene:?}");
+        left_out += all.stats.counts.bricks_visited - bounded.stats.counts.bricks_visited;
+    }
+    assert!(left_out > 100, "only {left_out} bricks are left out");
+}
+
+/// Neighbouring slabs of equal values: the nearest is chosen, however rounding tells them apart, and its gradient gives the normal.
+#[test]
+fn of_equal_extremes_the_nearest_is_chosen() {
+    let values = (0..24 * 24 * 24_u32).map(|index| {
+        let [x, y, z] = [index % 24, index / 24 % 24, index / 576];
+        // A plateau that other matter touches behind, and noise around it.
+        if (6..18).contains(&y) && (4..20).contains(&x) && (4..20).contains(&z) {
+            200.1
+        } else {
+            (index * 7919 % 97) as f32
+        }
+    });
+    let volume = Volume::new("plateau", glam::UVec3::splat(24), DVec3::ONE, values.collect()).unwrap();
+    for direction in [[0.0, 1.0, 0.0], [0.2, 0.9, -0.1]] {
+        for interpolation in [Interpolation::Smooth, Interpolation::Exact] {
+            let (_, mut scene) = after();
+            scene.camera = camera(direction, 20.0);
+            scene.splatting.compositing = Compositing::Maximum;
+            scene.splatting.interpolation = interpolation;
+            let psnr = psnr(&draw(&volume, &scene).image, &twin(&volume, &scene));
+            println!("{direction:?}, {interpolation:?}: {psnr:.1} dB");
+            assert!(psnr > required(&scene), "{direction:?}, {interpolation:?}: {psnr} dB");
+        }
+    }
+}
+
+/// The preset `mip` shows the voxels' own greatest values, at a pixel per voxel along an axis.
+#[test]
+#[ignore = "needs the shared data: SHEETSPLAT_SHARED=FOLDER"]
+fn shared_maximum_of_a_neuron_is_that_of_its_voxels() {
+    let volume = Volume::open(&shared("data/neuron.nrrd")).unwrap();
+    let [nx, ny, _] = volume.dims().to_array().map(|n| n as usize);
+    let sets = [
+        "preset=mip".to_owned(),
+        format!("image={{width={nx},height={ny}}}"),
+        format!("camera={{direction=[0,0,1],up=[0,-1,0],fit=\"volume\",height={ny}}}"),
+    ];
+    let scene = Scene::from_volume(VolumeSource::Memory, &sets).unwrap();
+    let mut greatest = vec![0.0_f32; nx * ny];
+    for (at, value) in volume.values().iter().enumerate() {
+        let greatest = &mut greatest[at % (nx * ny)];
+        *greatest = greatest.max(value);
+    }
+    let image = draw(&volume, &scene).image;
+    let bright = (0..nx * ny).filter(|&at| greatest[at] >= 100.0);
+    let (mut ours, mut theirs, mut count) = (0.0, 0.0, 0);
+    for at in bright {
+        // Opacities rise from 0 to the greatest value's, 255.
+        ours += 255.0 * f64::from(image.pixels[at][0]);
+        theirs += f64::from(greatest[at]);
+        count += 1;
+    }
+    println!("{:.2} where the voxels' is {:.2}, {count} pixels", ours / f64::from(count), theirs / f64::from(count));
+    assert!(count > 3000 && (ours / theirs - 1.0).abs() < 0.001, "{ours} {theirs} of {count} pixels");
 }
 
 /// Depths of first hits, by all compositings that have them.

@@ -27,7 +27,7 @@ fn presets_and_chosen_transfer_functions_are_classified_after_splatting() {
         ("preset = 'ct-skin'", &[], After),
         ("preset = 'mr-head'\ntransfer.opacity = [[0, 0.5]]", &[], After),
         ("preset = 'xray'", &[], Before),
-        ("preset = 'mip'", &[], Before),
+        ("preset = 'mip'", &[], After),
         ("preset = 'confocal'", &[], Before),
         ("preset = 'labels'", &[], Before),
         (transfer, &[], Before),

@@ -184,7 +184,13 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("shading.gradient", "2", "shading.gradient", "2 (integer)", "\"differences\" or \"kernel\""),
     ("splatting.classification", "'never'", "splatting.classification", "\"never\"", "\"before\" or \"after\""),
     ("splatting.classification", "true", "splatting.classification", "true (boolean)", "\"before\" or \"after\""),
-    ("splatting.interpolation", "'cubic'", "splatting.interpolation", "\"cubic\"", "\"smooth\" or \"exact\""),
+    (
+        "splatting.interpolation",
+        "'cubic'",
+        "splatting.interpolation",
+        "\"cubic\"",
+        "\"smooth\" or \"exact\" or \"auto\"",
+    ),
     ("splatting.footprint", "'gauss'", "splatting.footprint", "\"gauss\"", "\"summed-area\" or \"sections\""),
     (
         "splatting.compositing",

@@ -46,7 +46,8 @@ pub(super) fn splatting(ui: &mut Ui, splatting: &mut Splatting) {
         choice(ui, "classification", &mut splatting.classification, &classifications);
     });
     if splatting.classification == Classification::After {
-        let interpolations = [(Interpolation::Smooth, "smooth"), (Interpolation::Exact, "exact")];
+        let interpolations =
+            [(Interpolation::Smooth, "smooth"), (Interpolation::Exact, "exact"), (Interpolation::Auto, "auto")];
         choice(ui, "interpolation", &mut splatting.interpolation, &interpolations);
     }
     choice(

@@ -126,6 +126,12 @@ impl<'a> Field<'a> {
         if is_difference { of_value + 1.0 } else { of_value }
     }
 
+    /// The number of a coefficient.
+    #[inline(always)]
+    pub(super) fn number(&self, coefficient: f32) -> f32 {
+        (coefficient - self.base) * self.scale
+    }
+
     /// What is kept of a voxel, given its index.
     pub(super) fn read(&self, index: usize) -> (f32, Option<f32>) {
         (self.coefficients.at(index), self.differences.map(|differences| differences.at(3 * index)))
@@ -403,7 +409,7 @@ mod tests {
             let sets = [format!("splatting.radius={radius}"), format!("splatting.falloff={falloff}")];
             let mut scene = Scene::from_volume(VolumeSource::Builtin("head:8".to_owned()), &sets).unwrap();
             scene.splatting.interpolation = interpolation;
-            let own = Colors::new(&volume, interpolation, (radius, falloff)).unwrap().unwrap();
+            let own = Colors::new(&volume, interpolation == Interpolation::Exact, (radius, falloff)).unwrap().unwrap();
             let coefficients = (volume.values(), own.of(&volume));
             let whole = (&volume, Extent::whole(volume.grid()));
             let ours = Field::new(whole, coefficients, None, numbers, (radius, falloff), Gradient::Differences);
