@@ -36,6 +36,7 @@ mod tiff;
 mod values;
 mod vtk;
 mod zarr;
+mod zarr_axes;
 
 use std::cell::RefCell;
 use std::fs;
