@@ -33,6 +33,7 @@ mod several;
 mod shared;
 mod shear;
 mod tiff;
+mod tiff_planes;
 mod values;
 mod vtk;
 mod zarr;
