@@ -16,6 +16,7 @@ mod holes;
 #[cfg(feature = "http")]
 mod http;
 mod in_memory;
+mod label_grids;
 mod limits;
 mod metaimage;
 mod mgh;
