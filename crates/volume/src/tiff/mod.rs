@@ -3,6 +3,7 @@
 //! The spacing comes from ImageJ's or OME's description, or else from the resolution, which has no distance between pages: then the
 //! distance between columns serves. Values are the file's, whichever it calls black.
 
+mod calibration;
 mod description;
 mod directory;
 mod display;
@@ -19,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use self::description::Calibration;
+use self::calibration::Calibration;
 use self::pages::{Page, Pages};
 use self::stack::{Place, Runs, Stack};
 use super::VolumeError;

@@ -14,7 +14,7 @@ use super::super::fields::Fields;
 use super::super::series::MAX_CHANNELS;
 use super::super::text::number;
 use super::super::{unit, xml};
-use super::description::Calibration;
+use super::calibration::Calibration;
 use super::display;
 use super::stack::{Axis, Place, Run, Runs, Stack};
 
@@ -57,7 +57,7 @@ pub(super) fn read(path: &Path, samples: u32, description: &str) -> Result<Calib
                     return Err(invalid(path, "BinaryOnly", found, "a file that describes its planes itself"));
                 }
                 "TiffData" => {
-                    tiff_data.push(TiffData { fields: xml::attributes(path, &element)?, file: None, uuid: None })
+                    tiff_data.push(TiffData { fields: xml::attributes(path, &element)?, file: None, uuid: None });
                 }
                 "UUID" => {
                     is_uuid = true;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::error::volume::invalid;
-use super::description::Calibration;
+use super::calibration::Calibration;
 use super::stack::Runs;
 
 /// The maximum number of names in an error.
