@@ -9,8 +9,8 @@ use glam::DVec3;
 use super::{Channel, Scene, VolumeSource};
 use crate::appearance::{Preset, categories};
 use crate::volume::{
-    self, Access, AdaptedStore, Labels, Resampling, Selection, Store, StreamedChannel, StreamedLevel, Volume,
-    VolumeError, builtin, raw_store,
+    self, Access, AdaptedStore, Resampling, Selection, Store, StreamedChannel, StreamedLevel, Volume, VolumeError,
+    builtin, raw_store,
 };
 
 /// The scene's volume with all channels, on the first one's grid.
@@ -164,9 +164,8 @@ fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, Vol
     };
     let volume = match &settings.labels {
         Some(path) => {
-            let labels = Labels::read(path, &access.whole_at(volume.level()))?;
-            let spacing = labels.spacing.filter(|_| settings.spacing.is_none());
-            volume.with_labels(Labels { spacing, ..labels })?
+            let access = access.whole_at(volume.level());
+            volume.with_labels_of(path, settings.spacing.is_some(), &access)?
         }
         None => volume,
     };

@@ -7,6 +7,7 @@ use std::sync::{Arc, PoisonError};
 use super::access::Access;
 use super::address::archive_and_inner;
 use super::error::volume::invalid;
+use super::guard::guarded;
 use super::head::{head, is_bare_dicom};
 use super::loaded::Loaded;
 use super::seek::FileStore;
@@ -168,7 +169,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
     }
     let found = match format {
         None if access.is_folder(file)? => return read_folder(path, access, &formats),
-        Some(Format { name, read: Ok(read), .. }) => return Ok((name, read(path, access)?)),
+        Some(Format { name, read: Ok(read), .. }) => return Ok((name, guarded(path, || read(path, access))?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         None => match path.extension() {
             Some(extension) => format!("\".{}\"", extension.display()),
@@ -200,7 +201,7 @@ pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn St
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         Some(Format { name, read: Ok(read), .. }) if SEEKABLE.contains(name) => {
             let (noting, notes) = access.noting();
-            let loaded = read(path, &noting)?;
+            let loaded = guarded(path, || read(path, &noting))?;
             let notes = notes.lock().unwrap_or_else(PoisonError::into_inner);
             return FileStore::of_header(path, (name, &loaded), &notes, access);
         }
@@ -305,7 +306,7 @@ fn read_folder<T: Voxel>(
             if let Some(series) = access.series().filter(|_| *name != DICOM) {
                 return Err(invalid(path, "series", series, NO_SERIES));
             }
-            return Ok((name, read(path, files, access)?));
+            return Ok((name, guarded(path, || read(path, files, access))?));
         }
         [(Format { name, read: Err(feature), .. }, _)] => needs(name, feature),
         several => {

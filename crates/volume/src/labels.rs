@@ -7,10 +7,12 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3};
 
 use super::access::{Access, ReadOptions};
+use super::error::volume::refused;
 use super::format;
 use super::loaded::Loaded;
+use super::resample::labels_onto;
 use super::voxel::Voxel;
-use super::{Grid, Volume, VolumeError};
+use super::{Grid, Orientation, Volume, VolumeError};
 
 /// Spacings whose relative difference is less than this count as equal.
 const SAME_SPACING: f64 = 1e-4;
@@ -50,10 +52,16 @@ impl Labels {
 
     #[doc(hidden)]
     pub fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        Self::oriented(path, access).map(|(labels, _)| labels)
+    }
+
+    /// The labels of a file, and how they lie in the patient, if it states that.
+    fn oriented(path: &Path, access: &Access) -> Result<(Self, Option<Orientation>), VolumeError> {
         let (_, loaded) = format::read::<u16>(path, access)?;
         loaded.check_single(path, "one: a label for every voxel")?;
-        let Loaded { dims, spacing, label_names: names, values, .. } = loaded;
-        Ok(Self { origin: path.display().to_string(), dims, spacing, values: values.into(), names })
+        let Loaded { dims, spacing, label_names: names, values, orientation, .. } = loaded;
+        let origin = path.display().to_string();
+        Ok((Self { origin, dims, spacing, values: values.into(), names }, orientation))
     }
 }
 
@@ -76,6 +84,27 @@ pub fn labels_of(
 }
 
 impl Volume {
+    /// The same volume with the labels of a file. Where both files state how they lie in the patient, labels on another grid are resampled.
+    /// `has_spacing` says that the labels' spacing does not count.
+    ///
+    /// # Errors
+    /// As for [`Labels::open_with`] and [`Self::with_labels`], and if the labels lie nowhere in the volume.
+    #[doc(hidden)]
+    pub fn with_labels_of(self, path: &Path, has_spacing: bool, access: &Access) -> Result<Self, VolumeError> {
+        let (labels, orientation) = Labels::oriented(path, access)?;
+        if let (Some(own), Some(of_volume)) = (&orientation, self.orientation()) {
+            let grid = Grid::new(labels.dims, labels.spacing.unwrap_or(DVec3::ONE));
+            grid.check().map_err(|error| refused(&labels.origin, error))?;
+            let places = ((&grid, Some(own)), (self.grid(), Some(of_volume)));
+            if let Some(values) = labels_onto(&labels.values, places, path, access)? {
+                let (dims, spacing) = (self.dims(), Some(self.spacing()));
+                return self.with_labels(Labels { dims, spacing, values, ..labels });
+            }
+        }
+        let spacing = labels.spacing.filter(|_| !has_spacing);
+        self.with_labels(Labels { spacing, ..labels })
+    }
+
     /// The same volume with other labels.
     ///
     /// # Errors

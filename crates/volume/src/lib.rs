@@ -30,6 +30,9 @@ mod file;
 mod folder;
 mod format;
 mod grid;
+mod guard;
+#[cfg(any(feature = "npy", feature = "tiff", feature = "zarr"))]
+mod half;
 mod head;
 mod identity;
 mod index;

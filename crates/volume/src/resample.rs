@@ -104,7 +104,7 @@ impl Volume {
         let values: Vec<f32> = (0..count).into_par_iter().map(place).map(value).collect();
         if values.iter().all(|value| value.is_nan()) {
             let name = origin.display().to_string();
-            let [own, other] = [&self, grid].map(bounds);
+            let [own, other] = [places[1], places[0]].map(bounds);
             return Err(VolumeError::invalid(
                 &name,
                 key,
@@ -116,12 +116,7 @@ impl Volume {
         let nearest = if resampling == Resampling::Nearest { ", each label the nearest one" } else { "" };
         log::warn!("{name}: {key}: resampled from {own} to {dims} voxels, the first channel's{nearest}");
         let labels: Option<Arc<[u16]>> = self.labels().map(|labels| {
-            let nearest = |index: u32| {
-                let at = place(index);
-                let voxel = at.round().clamp(DVec3::ZERO, own_last).as_uvec3();
-                let is_there = (at - voxel.as_dvec3()).abs().max_element() <= 0.5 + SAME_PLACE;
-                if is_there { labels[self.grid().index_of(voxel) as usize] } else { 0 }
-            };
+            let nearest = |index: u32| voxel_around(place(index), self.grid()).map_or(0, |at| labels[at]);
             (0..count).into_par_iter().map(nearest).collect()
         });
         let colors: Option<Arc<[Texel]>> = self.colors().map(|colors| {
@@ -167,10 +162,47 @@ impl Volume {
     }
 }
 
-/// The box of a volume's voxel centres, in its file's space or, without one, around its centre.
-fn bounds(volume: &Volume) -> String {
-    let last = (volume.dims().as_dvec3() - 1.0) * volume.spacing();
-    let (axes, first) = match volume.orientation() {
+/// The index of the voxel that a place lies in; `None` beyond the grid.
+fn voxel_around(at: DVec3, grid: &Grid) -> Option<usize> {
+    let voxel = at.round().clamp(DVec3::ZERO, grid.dims.as_dvec3() - 1.0).as_uvec3();
+    let is_there = (at - voxel.as_dvec3()).abs().max_element() <= 0.5 + SAME_PLACE;
+    is_there.then(|| grid.index_of(voxel) as usize)
+}
+
+/// The labels of a file on the grid of the volume that they are of, each the nearest one in the files' own space, 0 beyond them; `None` if they lie there
+/// already.
+///
+/// # Errors
+/// If they lie nowhere in the volume, or memory is short.
+pub(super) fn labels_onto(
+    labels: &[u16],
+    (own, volume): (Oriented, Oriented),
+    path: &Path,
+    access: &Access,
+) -> Result<Option<Arc<[u16]>>, VolumeError> {
+    /// The setting that names the file.
+    const KEY: &str = "labels";
+    if is_same_grid(volume, own) {
+        return Ok(None);
+    }
+    let placement = Placement::new(volume, own);
+    let count = volume.0.dims.element_product();
+    access.reserve(path, KEY, format!("{count} voxels on the volume's grid"), 2 * u64::from(count))?;
+    let index = |index: u32| voxel_around(placement.at(volume.0.voxel_at(index).as_dvec3()), own.0);
+    if !(0..count).into_par_iter().any(|at| index(at).is_some()) {
+        let [own, volume] = [own, volume].map(bounds);
+        let name = path.display().to_string();
+        return Err(VolumeError::invalid(&name, KEY, own, format!("a box that overlaps the volume's, {volume}")));
+    }
+    let (name, from, to) = (path.display(), own.0.dims, volume.0.dims);
+    log::warn!("{name}: {KEY}: resampled from {from} to {to} voxels, the volume's, each label the nearest one");
+    Ok(Some((0..count).into_par_iter().map(|at| index(at).map_or(0, |at| labels[at])).collect()))
+}
+
+/// The box of a grid's voxel centres, in its file's space or, without one, around its centre.
+fn bounds((grid, orientation): Oriented) -> String {
+    let last = (grid.dims.as_dvec3() - 1.0) * grid.spacing;
+    let (axes, first) = match orientation {
         Some(Orientation { axes, origin }) => (*axes, *origin),
         None => (glam::DMat3::IDENTITY, -last / 2.0),
     };

@@ -239,8 +239,8 @@ pub fn check_grids((first, further): (&StreamedChannel, &[StreamedChannel])) -> 
         }
         let Some(labels) = &channel.labels else { continue };
         labels.check()?;
-        // Labels lie where the values do, whatever their file says of the patient.
-        if !is_same_grid((channel.values.grid(), None), (labels.grid(), None)) {
+        let of_labels = labels.store.facts();
+        if !is_same_grid(oriented(&channel.values, &own), oriented(labels, &of_labels)) {
             return Err(other_grid(labels, "labels", "the values", channel));
         }
     }
@@ -250,8 +250,10 @@ pub fn check_grids((first, further): (&StreamedChannel, &[StreamedChannel])) -> 
 /// The error for a level on another grid than that of a channel.
 fn other_grid(found: &StreamedLevel, key: &str, name: &str, of: &StreamedChannel) -> VolumeError {
     let shown = |Grid { dims, spacing, .. }: &Grid| format!("{dims} voxels of {spacing}");
-    let allowed =
-        format!("the grid of {name}, {}, for a volume that is streamed, or more memory", shown(of.values.grid()));
+    let allowed = format!(
+        "the grid of {name}, {}, in one place, for a volume that is streamed, or more memory",
+        shown(of.values.grid())
+    );
     VolumeError::invalid(&found.origin, key, format!("a grid of {}", shown(found.grid())), allowed)
 }
 

@@ -1,55 +1,50 @@
 //! What a file states about its pages: the description by ImageJ or OME, and the resolution.
 
-use std::path::Path;
-
 use ::tiff::tags::Tag;
-use glam::DVec3;
-use quick_xml::Reader;
-use quick_xml::events::Event;
 
 use super::super::VolumeError;
 use super::super::display::ChannelDisplay;
-use super::super::error::volume::invalid;
 use super::super::fields::Fields;
 use super::super::series::MAX_CHANNELS;
 use super::super::text::number;
-use super::super::unit::{common, unit};
-use super::super::xml;
+use super::super::unit::unit;
+use super::calibration::Calibration;
 use super::display;
+use super::ome;
 use super::pages::Pages;
-use super::stack::{Axis, Place, Run, Runs, Stack};
+use super::shaped::Shaped;
+use super::stack::Stack;
 
 /// A resolution in pixels per inch that programs write by default, without meaning.
 const NOMINAL_DPI: f64 = 72.0;
 
-/// The voxel sizes, the expected number of slices, and the meaning of samples.
-#[derive(Default)]
-pub(super) struct Calibration {
-    /// The spacing along x and y.
-    pub(super) spacing: Option<[f64; 2]>,
-    /// The spacing along z; ignored where x and y have none.
-    pub(super) between_slices: Option<f64>,
-    pub(super) unit: Option<String>,
-    /// What the pages show.
-    pub(super) stack: Option<Stack>,
-    /// Where pages are not in the stack's order.
-    pub(super) runs: Runs,
-    pub(super) channel_names: Vec<String>,
-    pub(super) displays: Vec<ChannelDisplay>,
-    /// Slope and intercept.
-    pub(super) rescale: Option<[f64; 2]>,
-}
-
 impl Calibration {
     /// The calibration on the first page.
     pub(super) fn of(pages: &mut Pages) -> Result<Self, VolumeError> {
-        let description = pages.description()?;
-        if description.starts_with("ImageJ=") {
-            return Self::of_image_j(pages, &description);
+        // The first one that is known decides, as for tifffile.
+        for description in pages.descriptions()? {
+            if description.starts_with("ImageJ=") {
+                return Self::of_image_j(pages, &description);
+            }
+            if description.contains("<OME") || description.contains("<ome:OME") {
+                return ome::read(&pages.path, pages.page.samples, &description);
+            }
+            if let Some(shaped) = Shaped::parse(&description) {
+                let (stack, is_contiguous) = (shaped.stack(&pages.path, pages.page)?, shaped.is_truncated);
+                return Ok(Self { stack, is_contiguous, ..Self::of_resolution(pages)? });
+            }
         }
-        if description.contains("<OME") || description.contains("<ome:OME") {
-            return Self::of_ome(&pages.path, pages.page.samples, &description);
-        }
+        // Slices of one directory: MetaMorph's stacks state something about each, and others a depth.
+        let slices = match pages.count_of(UIC2)? {
+            0 | 1 => pages.depth()?,
+            planes => planes,
+        };
+        let stack = (slices > 1).then(|| Stack::of_slices(slices));
+        Ok(Self { is_contiguous: stack.is_some(), stack, ..Self::of_resolution(pages)? })
+    }
+
+    /// The distances between pixels that the resolution states.
+    fn of_resolution(pages: &mut Pages) -> Result<Self, VolumeError> {
         let resolution_unit = pages.unsigned::<u16>(Tag::ResolutionUnit)?.unwrap_or(INCH);
         let (spacing, unit) = match (pixels_per_unit(pages), resolution_unit) {
             (Some([x, y]), INCH) if [x, y] != [NOMINAL_DPI; 2] => (Some([25.4 / x, 25.4 / y]), unit("mm")),
@@ -73,13 +68,16 @@ impl Calibration {
             let parse = |text: Option<&str>| text.unwrap_or("1").parse::<u32>().ok().filter(|&count| count > 0);
             fields.value(name, "a positive integer", parse)
         };
-        let images = count("images")?;
         let [slices, channels, frames] = [count("slices")?, count("channels")?, count("frames")?];
+        // Micro-Manager leaves it out; then all pages count.
+        let is_counted = fields.get("images").is_some();
+        let product = slices.saturating_mul(channels).saturating_mul(frames);
+        let images = if is_counted { count("images")? } else { product };
         let mut stack = Stack::of_slices(images);
         match [slices, channels, frames].map(|count| count > 1) {
             [_, false, false] => {}
             // Programs without a notion of axes write this.
-            [false, true, false] | [false, false, true] => {
+            [false, true, false] | [false, false, true] if is_counted => {
                 let what = if channels > 1 { "channels" } else { "frames" };
                 log::warn!("{}: the description says {images} {what}: taken to be slices", pages.path.display());
             }
@@ -139,86 +137,16 @@ impl Calibration {
         }
         // ImageJ omits a distance of 1.
         let between_slices = between.or((images > 1).then_some(1.0));
-        let (stack, channel_names) = (Some(stack), Vec::new());
-        let (unit, runs) = (length_unit, Runs::default());
-        Ok(Self { spacing, between_slices, unit, stack, runs, channel_names, displays, rescale })
-    }
-
-    /// Parses the attributes of the single element `Pixels`. A pixel has a number of samples.
-    fn of_ome(path: &Path, samples: u32, description: &str) -> Result<Self, VolumeError> {
-        let damage = |error| xml::damage(path, error);
-        let mut reader = Reader::from_str(description);
-        let mut pixels: Option<Fields> = None;
-        let (mut tiff_data, mut channel_names, mut colors) = (Vec::new(), Vec::new(), Vec::new());
-        loop {
-            match reader.read_event().map_err(damage)? {
-                Event::Start(element) | Event::Empty(element) => match element.local_name().as_ref() {
-                    "Pixels" if pixels.is_some() => {
-                        return Err(invalid(path, "Pixels", "more than one image", "one image"));
-                    }
-                    "Pixels" => pixels = Some(xml::attributes(path, &element)?),
-                    "TiffData" => tiff_data.push(xml::attributes(path, &element)?),
-                    "Channel" => {
-                        let channel = xml::attributes(path, &element)?;
-                        let number = channel_names.len();
-                        colors.push(channel.get("Color").and_then(display::of_ome));
-                        channel_names.push(channel.get("Name").map_or(format!("channel {number}"), str::to_owned));
-                    }
-                    _ => {}
-                },
-                Event::Eof => break,
-                _ => {}
-            }
-        }
-        let Some(pixels) = pixels else {
-            return Err(invalid(path, "Pixels", "no such element", "one image"));
-        };
-        let count = |name: &str| {
-            pixels.value(name, "a positive integer", |text| text?.parse::<u32>().ok().filter(|&count| count > 0))
-        };
-        let order = pixels.value("DimensionOrder", "XY and the letters Z, C and T in any order", |text| {
-            // Without channels and times the order does not matter.
-            let axes: Vec<Axis> =
-                text.unwrap_or("XYZCT").strip_prefix("XY")?.chars().map(axis).collect::<Option<_>>()?;
-            let has = |axis| axes.contains(&axis);
-            let is_all = has(Axis::Slice) && has(Axis::Channel) && has(Axis::Time);
-            axes.as_slice().try_into().ok().filter(|_| is_all)
-        })?;
-        let [slices, channels, times] = [count("SizeZ")?, count("SizeC")?, count("SizeT")?];
-        let stack = Stack { slices, channels, times, order }.of_pixels(samples);
-        if stack.pages().is_none() {
-            let found = format!("{slices}, {channels}, {times}");
-            let allowed = format!("at most {} pages, and {MAX_CHANNELS} channels", u32::MAX);
-            return Err(pixels.invalid("SizeZ, SizeC, SizeT", found, allowed));
-        }
-        let runs = tiff_data.iter().map(|tiff_data| run(tiff_data, &stack)).collect::<Result<Vec<Run>, _>>()?;
-        let runs = Runs::new(&runs);
-        let size = |name: &str| {
-            pixels.value(name, "a positive finite number", |text| match text {
-                None => Some(None),
-                Some(text) => number(text).filter(|&size| size > 0.0).map(Some),
-            })
-        };
-        let [x, y, z] = [size("PhysicalSizeX")?, size("PhysicalSizeY")?, size("PhysicalSizeZ")?];
-        let names = ["PhysicalSizeXUnit", "PhysicalSizeYUnit", "PhysicalSizeZUnit"];
-        let units = names.map(|name| pixels.get(name).unwrap_or("µm"));
-        let unit = common(units);
-        if units.iter().any(|&other| unit != super::super::unit::unit(other)) {
-            return Err(pixels.invalid("PhysicalSizeXUnit, YUnit, ZUnit", units.join(", "), "one unit for all"));
-        }
-        let spacing = x.zip(y).map(|(x, y)| [x, y]);
-        let unit = unit.filter(|_| spacing.is_some());
-        // White is what a file states that states nothing.
-        if colors.iter().flatten().all(|&color| color == DVec3::ONE) {
-            colors.clear();
-        }
-        let display =
-            |color: Option<DVec3>| ChannelDisplay { colors: color.into_iter().collect(), ..ChannelDisplay::default() };
-        let displays = colors.into_iter().map(display).collect();
-        let stack = Some(stack);
-        Ok(Self { spacing, between_slices: z, unit, stack, runs, channel_names, displays, rescale: None })
+        let stack = Some(stack).filter(|_| is_counted || images > 1);
+        let unit = length_unit;
+        // ImageJ writes data too large for TIFF as one directory, followed by all slices.
+        let is_contiguous = is_counted;
+        Ok(Self { spacing, between_slices, unit, stack, is_contiguous, displays, rescale, ..Self::default() })
     }
 }
+
+/// A tag of MetaMorph's stacks with as many values as there are planes.
+const UIC2: u16 = 33629;
 
 /// Values of the tag `ResolutionUnit`.
 const NO_UNIT: u16 = 1;
@@ -244,31 +172,5 @@ fn value_function(fields: &Fields) -> Result<Option<[f64; 2]>, VolumeError> {
             );
             Ok(None)
         }
-    }
-}
-
-/// The pages that an element `TiffData` is about: one if it names the first, all that are left if it does not, or as many as it says.
-fn run(tiff_data: &Fields, stack: &Stack) -> Result<Run, VolumeError> {
-    let number = |name: &str, default: u32| {
-        tiff_data.value(name, "a number", |text| text.map_or(Some(default), |text| text.parse::<u32>().ok()))
-    };
-    let place = Place { slice: number("FirstZ", 0)?, channel: number("FirstC", 0)?, time: number("FirstT", 0)? };
-    let first = stack.number(place).ok_or_else(|| {
-        let Place { slice, channel, time } = place;
-        let Stack { slices, channels, times, .. } = stack;
-        let allowed = format!("numbers below SizeZ, SizeC and SizeT: {slices}, {channels}, {times}");
-        tiff_data.invalid("FirstZ, FirstC, FirstT", format!("{slice}, {channel}, {time}"), allowed)
-    })?;
-    let count = if tiff_data.get("IFD").is_some() { 1 } else { u32::MAX };
-    Ok(Run { page: number("IFD", 0)?, number: first, count: number("PlaneCount", count)? })
-}
-
-/// The axis that a letter stands for.
-fn axis(letter: char) -> Option<Axis> {
-    match letter {
-        'Z' => Some(Axis::Slice),
-        'C' => Some(Axis::Channel),
-        'T' => Some(Axis::Time),
-        _ => None,
     }
 }

@@ -13,6 +13,8 @@ pub(super) fn most_values(file_bytes: u64) -> u64 {
 
 /// A tag that may have any number of values; it is read separately.
 const DESCRIPTION: u16 = 270;
+/// The descriptions that are looked at.
+const MAX_DESCRIPTIONS: usize = 4;
 const XMP: u16 = 700;
 const PRIVATE: u16 = 32768;
 
@@ -67,6 +69,30 @@ pub(super) fn low_byte_of(file: &mut (impl Read + Seek), directory: u64, tag: u1
         }
     }
     Ok(None)
+}
+
+/// The position and length of the text of every description in the directory at `directory`, in the order of the entries: some programs write two.
+pub(super) fn descriptions(file: &mut (impl Read + Seek), directory: u64) -> io::Result<Vec<(u64, u64)>> {
+    /// The type codes of bytes and of text.
+    const BYTES: [u64; 2] = [1, 2];
+    let mut magic = [0; 4];
+    file.rewind()?;
+    file.read_exact(&mut magic)?;
+    let (big_endian, is_big) = (magic[0] == b'M', magic.contains(&43));
+    let (offset, count) = if is_big { (8, 8) } else { (4, 2) };
+    file.seek(SeekFrom::Start(directory))?;
+    let mut found = Vec::new();
+    for _ in 0..number(file, count, big_endian)? {
+        let tag = number(file, 2, big_endian)?;
+        let kind = number(file, 2, big_endian)?;
+        let length = number(file, offset, big_endian)?;
+        let at = file.stream_position()?;
+        let value_or_offset = number(file, offset, big_endian)?;
+        if tag == u64::from(DESCRIPTION) && BYTES.contains(&kind) && found.len() < MAX_DESCRIPTIONS {
+            found.push((if length > offset as u64 { value_or_offset } else { at }, length));
+        }
+    }
+    Ok(found)
 }
 
 fn number(file: &mut impl Read, bytes: usize, big_endian: bool) -> io::Result<u64> {

@@ -3,12 +3,16 @@
 //! The spacing comes from ImageJ's or OME's description, or else from the resolution, which has no distance between pages: then the
 //! distance between columns serves. Values are the file's, whichever it calls black.
 
+mod calibration;
 mod description;
 mod directory;
 mod display;
+mod ome;
 mod overlay;
 mod pages;
 mod run;
+mod set;
+mod shaped;
 mod stack;
 mod trial;
 
@@ -16,9 +20,9 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use self::description::Calibration;
+use self::calibration::Calibration;
 use self::pages::{Page, Pages};
-use self::stack::{Place, Stack};
+use self::stack::{Place, Runs, Stack};
 use super::VolumeError;
 use super::access::Access;
 use super::error::volume::invalid;
@@ -44,16 +48,16 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let channels = series.channels(selection);
     slices.channels.resize_with(channels.len(), OfChannel::default);
     // The channel of a page among those that are read, and its slice.
-    let wanted = |page: u32| {
-        let alone = Place { slice: page, ..Place::default() };
-        let place = stack.map_or(alone, |stack| stack.place(calibration.runs.number_of(page)));
+    let wanted = |number: u32| {
+        let alone = Place { slice: number, ..Place::default() };
+        let place = stack.map_or(alone, |stack| stack.place(number));
         let is_read = place.time == selection.time.unwrap_or(0) && channels.contains(&place.channel);
         is_read.then(|| ((place.channel - channels.start) as usize, place.slice))
     };
     let described = stack.and_then(Stack::pages);
     let mut count = 0;
-    if let Some(all) = described.filter(|&all| all > 1 && !pages.has_more()) {
-        // ImageJ writes data too large for TIFF as one directory, followed by all slices.
+    // Without such a statement, what follows a page are no planes.
+    if let Some(all) = described.filter(|&all| all > 1 && calibration.is_contiguous && !pages.has_more()) {
         let samples = Samples { big_endian: pages.is_big_endian(), ..slices.samples(1)? };
         let mut stream = Stream::raw(access.open(path)?)?;
         stream.skip(pages.contiguous()?)?;
@@ -75,14 +79,26 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
             count += 1;
         }
     } else {
-        loop {
-            if let Some(place) = wanted(count) {
-                slices.add(&mut pages, place, access)?;
+        let others = set::others(path, &calibration, access)?;
+        let is_set = !others.is_empty();
+        let mut read = |pages: &mut Pages, runs: &Runs| -> Result<(), VolumeError> {
+            for page in 0.. {
+                // A page of a set that no element is about is none of its planes.
+                if let Some(number) = if is_set { runs.stated(page) } else { Some(runs.number_of(page)) } {
+                    if let Some(place) = wanted(number) {
+                        slices.add(pages, place, access)?;
+                    }
+                    count += 1;
+                }
+                if !pages.next()? {
+                    break;
+                }
             }
-            count += 1;
-            if !pages.next()? {
-                break;
-            }
+            Ok(())
+        };
+        read(&mut pages, &calibration.runs)?;
+        for (file, runs) in others {
+            read(&mut Pages::open(&file, access)?, runs)?;
         }
     }
     match described {
@@ -177,7 +193,7 @@ impl<'a, T: Voxel> Slices<'a, T> {
     }
 
     fn samples(&self, count: u32) -> Result<Samples, VolumeError> {
-        let Page { size: [width, height], samples, kind } = self.page;
+        let Page { size: [width, height], samples, kind, .. } = self.page;
         let Some(dims) = width.checked_mul(samples).and_then(|width| dims_of([width, height, count])) else {
             return Err(invalid(self.path, "sizes", format!("{count} pages of {}", self.page), SIZES));
         };

@@ -13,8 +13,9 @@ use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::display::ChannelDisplay;
 use super::super::error::volume::{invalid, io_error};
+use super::super::half;
 use super::super::sample_type::SampleType;
-use super::directory::{low_byte_of, most_values, overlong_entry};
+use super::directory::{descriptions, low_byte_of, most_values, overlong_entry};
 use super::display;
 use super::overlay::Overlay;
 use super::trial::{self, is_suspicious};
@@ -25,6 +26,10 @@ const REDUCED: u32 = 1;
 const WHITE_IS_ZERO: u16 = 0;
 const BLACK_IS_ZERO: u8 = 1;
 const PALETTE: u16 = 3;
+const HIGHEST_BIT_FIRST: u16 = 1;
+
+/// The tag of a page that holds several slices.
+const IMAGE_DEPTH: u16 = 32997;
 
 /// LZW's longest string is 4096 bytes for a code of 12 bits; the other compressions here expand less.
 const MAX_EXPANSION: u64 = 4096;
@@ -38,10 +43,33 @@ pub(super) struct Page {
     pub(super) size: [u32; 2],
     /// The samples of a pixel, which lie side by side: one, or three or four of a colour.
     pub(super) samples: u32,
+    /// The type of the samples that become values.
     pub(super) kind: SampleType,
+    /// The bits of a sample in the file: 16 of floats that become `f32`, and 1 of whether a pixel is set.
+    bits: u32,
 }
 
 impl Page {
+    /// The bytes of the samples as they are stored, whose rows begin at whole bytes.
+    fn stored_bytes(self) -> u64 {
+        let [width, height] = self.size.map(u64::from);
+        // Products of a 32-bit size and a few bits fit in 64 bits.
+        (width * u64::from(self.samples) * u64::from(self.bits)).div_ceil(8).saturating_mul(height)
+    }
+
+    /// The samples that become values.
+    fn unpacked(self, bytes: Vec<u8>) -> Vec<u8> {
+        match (self.bits, self.kind) {
+            (16, SampleType::F32) => half::widen(&bytes),
+            (1, _) => {
+                let width = self.size[0] as usize;
+                let row = |row: &[u8]| (0..width).map(|x| row[x / 8] >> (7 - x % 8) & 1).collect::<Vec<u8>>();
+                bytes.chunks(width.div_ceil(8)).flat_map(row).collect()
+            }
+            _ => bytes,
+        }
+    }
+
     pub(super) fn bytes(self) -> u64 {
         let [width, height] = self.size.map(u64::from);
         // The product of two 32-bit sizes fits in 64 bits.
@@ -61,7 +89,12 @@ impl Display for Page {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let [width, height] = self.size;
         let colors = if self.samples > 1 { format!(" colours of {}", self.samples) } else { String::new() };
-        write!(f, "{width} × {height}{colors} {}", self.kind)
+        write!(f, "{width} × {height}{colors} ")?;
+        match (self.bits, self.kind) {
+            (1, _) => f.write_str("bits"),
+            (16, SampleType::F32) => f.write_str("float16"),
+            (_, kind) => kind.fmt(f),
+        }
     }
 }
 
@@ -103,7 +136,7 @@ impl Pages {
         limits.decoding_buffer_size = most_values(unclaimed) as usize * size_of::<Value>();
         let mut pages = Self {
             path: path.to_owned(),
-            page: Page { size: [0; 2], samples: 1, kind: SampleType::U8 },
+            page: Page { size: [0; 2], samples: 1, kind: SampleType::U8, bits: 8 },
             is_planar: false,
             palette: None,
             decoder: decoder.with_limits(limits),
@@ -163,10 +196,38 @@ impl Pages {
         (value > 0.0 && value.is_finite()).then_some(value)
     }
 
-    /// The first page's description, in any encoding.
-    pub(super) fn description(&mut self) -> Result<String, VolumeError> {
-        let bytes = self.bytes_of(Tag::ImageDescription, "ImageDescription")?.unwrap_or_default();
-        Ok(String::from_utf8_lossy(&bytes).trim_end_matches('\0').to_owned())
+    /// The first page's descriptions, in any encoding. The decoder knows only the last one.
+    pub(super) fn descriptions(&mut self) -> Result<Vec<String>, VolumeError> {
+        let directory = self.decoder.ifd_pointer().map_or(0, |pointer| pointer.0);
+        let (path, limit) = (self.path.clone(), self.unclaimed);
+        let file = self.decoder.inner();
+        let mut all = Vec::new();
+        for (at, length) in descriptions(file, directory).map_err(io_error(&path))? {
+            if length > limit {
+                let found = format!("{length} bytes");
+                return Err(invalid(&path, "ImageDescription", found, "no more than the file has"));
+            }
+            let mut bytes = vec![0; length as usize];
+            let read = file.seek(SeekFrom::Start(at)).and_then(|_| file.read_exact(&mut bytes));
+            read.map_err(|error| match error.raw_os_error() {
+                Some(_) => io_error(&path)(error),
+                None => invalid(&path, "ImageDescription", error, "a text within the file"),
+            })?;
+            all.push(String::from_utf8_lossy(&bytes).trim_end_matches('\0').to_owned());
+        }
+        Ok(all)
+    }
+
+    /// The number of a tag's values; 0 if the page has no such tag.
+    pub(super) fn count_of(&mut self, tag: u16) -> Result<u32, VolumeError> {
+        let entry = self.decoder.image_ifd().find_entry(Tag::from_u16_exhaustive(tag));
+        let count = entry.map_or(0, |entry| entry.count());
+        count.try_into().map_err(|_| invalid(&self.path, &format!("tag {tag}"), count, "at most 4294967295 values"))
+    }
+
+    /// The number of slices in the page.
+    pub(super) fn depth(&mut self) -> Result<u32, VolumeError> {
+        Ok(self.unsigned(Tag::from_u16_exhaustive(IMAGE_DEPTH))?.unwrap_or(1))
     }
 
     /// The first page's displays of channels by ImageJ's own tags. Damaged ones are left out, with a warning.
@@ -202,6 +263,19 @@ impl Pages {
     /// Determines the page's size and type. Refuses a page that is not a grid of numbers or that promises more than the file can hold.
     fn describe(&mut self) -> Result<(), VolumeError> {
         let name = self.name();
+        let order = self.unsigned::<u16>(Tag::FillOrder)?.unwrap_or(HIGHEST_BIT_FIRST);
+        if order != HIGHEST_BIT_FIRST {
+            return Err(invalid(&self.path, "FillOrder", order, "1: the highest bit comes first"));
+        }
+        let depth = self.depth()?;
+        if depth > 1 && (self.number > 1 || self.has_more()) {
+            return Err(invalid(
+                &self.path,
+                "ImageDepth",
+                format!("{depth} in {name} of several"),
+                "1, or a single page",
+            ));
+        }
         self.palette = self.take_palette()?;
         let failed = failed(&self.path, &name);
         let (width, height) = self.decoder.dimensions().map_err(&failed)?;
@@ -219,18 +293,22 @@ impl Pages {
                 Some(sample_type)
             }
             (ColorType::Gray(8), Some(sample_type)) if self.palette.is_some() => Some(sample_type),
+            (ColorType::Gray(1), Some(DecodingSampleType::U8)) if self.palette.is_none() => {
+                Some(DecodingSampleType::U8)
+            }
             (ColorType::Gray(8 | 16 | 32 | 64), Some(sample_type)) if self.palette.is_none() => Some(sample_type),
             _ => None,
         };
-        let Some(kind) = kind.and_then(sample_type_of) else {
+        let bits = u32::from(color.bit_depth());
+        let Some(kind) = kind.map(sample_type_of) else {
             let found = match color {
                 _ if self.palette.is_some() => format!("indices of a palette, {color:?}"),
                 _ => format!("{color:?}, {:?}", layout.sample_format),
             };
-            let allowed = "one sample a pixel, or RGB or RGBA: an integer of 8 to 64 bits, a float of 32 or 64 bits, or an index of 8 bits of a palette";
+            let allowed = "one sample a pixel, or RGB or RGBA: an integer of 1 or 8 to 64 bits, a float of 16 to 64 bits, or an index of 8 bits of a palette";
             return Err(invalid(&self.path, &name, found, allowed));
         };
-        self.page = Page { size: [width, height], samples, kind };
+        self.page = Page { size: [width, height], samples, kind, bits };
         self.is_planar = planes > 1;
         let tags = match self.decoder.get_chunk_type() {
             ChunkType::Strip => [Tag::StripOffsets, Tag::StripByteCounts],
@@ -283,7 +361,7 @@ impl Pages {
                 ChunkType::Tile => self.decoder.chunk_dimensions(),
             };
             let samples = if self.is_planar { 1 } else { self.page.samples };
-            let bytes = Page { size: [width, height], samples, ..self.page }.bytes();
+            let bytes = Page { size: [width, height], samples, ..self.page }.stored_bytes();
             let (offset, count) = (self.offsets.get(chunk).copied().unwrap_or(u64::MAX), self.counts[chunk]);
             let mut holds = count.saturating_mul(expansion) >= bytes;
             if holds && method != UNCOMPRESSED && is_suspicious(count, bytes) {
@@ -308,7 +386,8 @@ impl Pages {
         let mut ends = self.offsets.iter().zip(&self.counts).map(|(offset, count)| offset.checked_add(*count));
         let follow = self.offsets.iter().skip(1).all(|&offset| ends.next() == Some(Some(offset)));
         let is_strips = self.decoder.get_chunk_type() == ChunkType::Strip;
-        let is_one_piece = follow && is_strips && !self.is_planar && !self.is_compressed()?;
+        let is_whole = u64::from(self.page.bits) == 8 * self.page.kind.bytes();
+        let is_one_piece = follow && is_strips && is_whole && !self.is_planar && !self.is_compressed()?;
         let first = self.offsets.first().filter(|_| is_one_piece);
         let allowed = "as many as the description says, or uncompressed samples in one piece";
         first.copied().ok_or_else(|| invalid(&self.path, "pages", "1", allowed))
@@ -317,9 +396,13 @@ impl Pages {
     /// The page's samples, in the machine's byte order.
     pub(super) fn bytes(&mut self) -> Result<Vec<u8>, VolumeError> {
         // The size was checked against the file, and zeroed memory is committed only when it is written.
-        let mut bytes = vec![0; self.page.bytes() as usize];
-        let name = self.name();
-        self.decoder.read_image_bytes(&mut bytes).map_err(failed(&self.path, &name))?;
+        let mut bytes = vec![0; self.page.stored_bytes() as usize];
+        if self.is_planar && self.decoder.get_chunk_type() == ChunkType::Tile {
+            self.read_planes_of_tiles(&mut bytes)?;
+        } else {
+            let name = self.name();
+            self.decoder.read_image_bytes(&mut bytes).map_err(failed(&self.path, &name))?;
+        }
         if self.unsigned::<u16>(Tag::PhotometricInterpretation)? == Some(WHITE_IS_ZERO) {
             if matches!(self.page.kind, SampleType::F32 | SampleType::F64) {
                 let allowed = "BlackIsZero, for floats";
@@ -328,12 +411,40 @@ impl Pages {
             // The decoder inverts pages where 0 is white.
             bytes.iter_mut().for_each(|byte| *byte = !*byte);
         }
+        let bytes = self.page.unpacked(bytes);
         Ok(if self.is_planar { self.page.side_by_side(&bytes) } else { bytes })
+    }
+
+    /// Reads planes tile by tile. The decoder takes a tile at the bottom of any plane but the first for one without padding, and panics.
+    fn read_planes_of_tiles(&mut self, bytes: &mut [u8]) -> Result<(), VolumeError> {
+        let name = self.name();
+        let failed = failed(&self.path, &name);
+        let [width, height] = self.page.size;
+        let sample = self.page.bits as usize / 8;
+        let (tile_width, tile_height) = self.decoder.chunk_dimensions();
+        let (across, down) = (width.div_ceil(tile_width), height.div_ceil(tile_height));
+        let plane_bytes = width as usize * height as usize * sample;
+        let mut tile = Vec::new();
+        for (number, plane) in (0..).zip(bytes.chunks_mut(plane_bytes)) {
+            for at in 0..across * down {
+                let chunk = number * across * down + at;
+                let (columns, rows) = self.decoder.chunk_data_dimensions(chunk);
+                tile.resize(columns as usize * rows as usize * sample, 0);
+                self.decoder.read_chunk_bytes(chunk, &mut tile).map_err(&failed)?;
+                let (left, top) = (at % across * tile_width, at / across * tile_height);
+                let of_row = columns as usize * sample;
+                for (y, row) in (top..height).zip(tile.chunks(of_row)) {
+                    let first = (y as usize * width as usize + left as usize) * sample;
+                    plane[first..first + of_row].copy_from_slice(row);
+                }
+            }
+        }
+        Ok(())
     }
 }
 
-fn sample_type_of(sample_type: DecodingSampleType) -> Option<SampleType> {
-    Some(match sample_type {
+fn sample_type_of(sample_type: DecodingSampleType) -> SampleType {
+    match sample_type {
         DecodingSampleType::U8 => SampleType::U8,
         DecodingSampleType::U16 => SampleType::U16,
         DecodingSampleType::U32 => SampleType::U32,
@@ -342,10 +453,9 @@ fn sample_type_of(sample_type: DecodingSampleType) -> Option<SampleType> {
         DecodingSampleType::I16 => SampleType::I16,
         DecodingSampleType::I32 => SampleType::I32,
         DecodingSampleType::I64 => SampleType::I64,
-        DecodingSampleType::F32 => SampleType::F32,
+        DecodingSampleType::F16 | DecodingSampleType::F32 => SampleType::F32,
         DecodingSampleType::F64 => SampleType::F64,
-        DecodingSampleType::F16 => return None,
-    })
+    }
 }
 
 /// Tells damage from errors of the operating system: the decoder reports damage as an I/O error without an OS error code.

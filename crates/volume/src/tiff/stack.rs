@@ -80,11 +80,16 @@ impl Runs {
         Self(pieces)
     }
 
+    /// The number of a page in the stack's order: that of the first run that holds it, if any does.
+    pub(super) fn stated(&self, page: u32) -> Option<u32> {
+        let at = self.0.partition_point(|piece| piece.pages.end <= page.into());
+        let piece = self.0.get(at).filter(|piece| piece.pages.start <= page.into())?;
+        Some((piece.number + u64::from(page) - piece.pages.start) as u32)
+    }
+
     /// The number of a page in the stack's order: that of the first run that holds it, or else its own.
     pub(super) fn number_of(&self, page: u32) -> u32 {
-        let at = self.0.partition_point(|piece| piece.pages.end <= page.into());
-        let piece = self.0.get(at).filter(|piece| piece.pages.start <= page.into());
-        piece.map_or(page, |piece| (piece.number + u64::from(page) - piece.pages.start) as u32)
+        self.stated(page).unwrap_or(page)
     }
 }
 

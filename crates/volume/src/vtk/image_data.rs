@@ -55,6 +55,8 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         Some("BigEndian") => Some(true),
         Some(_) => None,
     })?;
+    // Text has no byte order: numbers come from it in the machine's.
+    let big_endian = if array.is_text() { cfg!(target_endian = "big") } else { big_endian };
     let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
     let channels = array.components().unwrap_or(1);
     let series = Series { channels, order: SeriesOrder::Interleaved, ..Series::default() };
@@ -228,7 +230,7 @@ impl Header {
     fn open(&self, path: &Path, access: &Access, array: &Array, samples: &Samples) -> Result<Stream, VolumeError> {
         let Array { fields, at, .. } = array;
         let (at, encoding) = match (fields.get("format"), &self.appended) {
-            (Some("ascii"), _) => (*at, "ascii"),
+            _ if array.is_text() => (*at, "ascii"),
             (Some("binary"), _) => (*at, "base64"),
             (Some("appended"), Some((appended, first))) => {
                 let offset = fields.value("offset", "a number of bytes", |text| text?.trim().parse::<u64>().ok())?;
@@ -296,6 +298,10 @@ impl Header {
 }
 
 impl Array {
+    fn is_text(&self) -> bool {
+        self.fields.get("format") == Some("ascii")
+    }
+
     fn name(&self) -> &str {
         self.fields.get("Name").unwrap_or("without a name")
     }

@@ -11,12 +11,12 @@ use serde_json::Value;
 use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::error::volume::invalid;
+use super::super::half;
 use super::super::sample_type::SampleType;
 use super::super::samples::Samples;
 use super::super::voxel::Voxel;
 use super::axes::{Axes, KINDS};
 use super::codec::Codecs;
-use super::half;
 use super::json::Json;
 use super::keys::Keys;
 use super::metadata::{self, ChunkKeys, Metadata};
@@ -100,9 +100,10 @@ impl Region {
 }
 
 impl ZarrArray {
-    /// Opens the array at a path of a store. Its axes are `axes`, or those that it names, or else the last ones of t, c, z, y, x.
+    /// Opens the array at a path of a store. Its axes are `axes`, or those that it names, or else the last ones of t, c, z,
+    /// y, x.
     pub(super) fn open(keys: &Arc<Keys>, path: &str, axes: Option<&Axes>) -> Result<Self, VolumeError> {
-        let (file, metadata) = metadata::find(keys, path)?;
+        let (file, mut metadata) = metadata::find(keys, path)?;
         let stated = Metadata::read(&Json::new(&file, &metadata))?;
         let Metadata { shape, number, fill, has_fill, chunk_keys, codecs } = stated;
         let wrong_axes = || {
@@ -114,7 +115,21 @@ impl ZarrArray {
         };
         let axes = match axes {
             Some(axes) => Some(*axes).filter(|axes| axes.count() == shape.len()),
-            None => Axes::plain(shape.len()),
+            None => {
+                let names = metadata::axis_names(keys, path, &Json::new(&file, &metadata), shape.len())?;
+                if !names.is_empty() {
+                    // In version 2 another file states the names, by which the store's identity differs, too.
+                    metadata["dimension_names"] = names.clone().into();
+                }
+                Axes::named(&names).or_else(|| {
+                    let plain = Axes::plain(shape.len());
+                    if let Some(plain) = plain.filter(|_| !Axes::say_nothing(&names)) {
+                        let (file, names) = (file.display(), names.join(", "));
+                        log::warn!("{file}: axes named {names}: taken to be {plain}");
+                    }
+                    plain
+                })
+            }
         };
         let axes = axes.ok_or_else(wrong_axes)?;
         let kind = number.kind();

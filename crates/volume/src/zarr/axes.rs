@@ -1,5 +1,7 @@
 //! The axes of an array.
 
+use std::fmt::{self, Display, Formatter};
+
 use super::super::VolumeError;
 use super::json::Json;
 
@@ -27,6 +29,24 @@ impl Axes {
     pub(super) fn plain(count: usize) -> Option<Self> {
         let missing = KINDS.checked_sub(count).filter(|_| count >= 3)?;
         Some(Self([0, 1, 2, 3, 4].map(|kind: usize| kind.checked_sub(missing))))
+    }
+
+    /// The axes of an array that names them, if all names are known ones, with x and y among them.
+    pub(super) fn named(names: &[String]) -> Option<Self> {
+        let mut places = [None; KINDS];
+        for (place, name) in names.iter().enumerate() {
+            let kind = named(&name.to_ascii_lowercase())?;
+            if places[kind as usize].replace(place).is_some() {
+                return None;
+            }
+        }
+        Some(Self(places)).filter(|axes| axes.of(Axis::X).is_some() && axes.of(Axis::Y).is_some())
+    }
+
+    /// Whether axes have no names, or those that xarray gives to axes without names.
+    pub(super) fn say_nothing(names: &[String]) -> bool {
+        let is_default = |name: &String| name.strip_prefix("dim_").is_some_and(|number| number.parse::<u32>().is_ok());
+        names.iter().all(|name| name.is_empty() || is_default(name))
     }
 
     /// The axes of an OME-Zarr image.
@@ -74,6 +94,27 @@ impl Axes {
         }
         unsorted
     }
+}
+
+impl Display for Axes {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let mut named: Vec<_> =
+            self.0.iter().zip(["t", "c", "z", "y", "x"]).filter_map(|(&at, name)| Some((at?, name))).collect();
+        named.sort_unstable();
+        f.write_str(&named.iter().map(|&(_, name)| name).collect::<Vec<_>>().join(", "))
+    }
+}
+
+/// The kind of an axis by its name alone, as an array states it that has no types of axes. Arrays of xarray in Python have the same names.
+fn named(name: &str) -> Option<Axis> {
+    Some(match name {
+        "t" | "time" | "times" => Axis::Time,
+        "c" | "channel" | "channels" => Axis::Channel,
+        "z" | "depth" | "slice" | "slices" | "plane" | "pln" => Axis::Z,
+        "y" | "row" | "rows" | "height" => Axis::Y,
+        "x" | "column" | "columns" | "col" | "cols" | "width" => Axis::X,
+        _ => return None,
+    })
 }
 
 /// The kind of an axis by its type and name.

@@ -48,6 +48,32 @@ pub(super) fn find(keys: &Keys, path: &str) -> Result<(PathBuf, Value), VolumeEr
     Err(invalid(&keys.file(path), "array", "nothing", "an array: zarr.json or .zarray"))
 }
 
+/// The names of an array's axes: its `dimension_names`, or the `_ARRAY_DIMENSIONS` among the attributes that xarray writes in version 2; an empty list if
+/// it states none. An axis without a name has an empty one.
+pub(super) fn axis_names(keys: &Keys, path: &str, file: &Json, axes: usize) -> Result<Vec<String>, VolumeError> {
+    let allowed = format!("a list of {axes} names, one for each axis");
+    let read = |names: Json| -> Result<Vec<String>, VolumeError> {
+        if !names.is_some() {
+            return Ok(Vec::new());
+        }
+        let list = names.list(&allowed)?;
+        let name = |name: &Json| match name.value() {
+            Some(Value::Null) => Some(String::new()),
+            _ => name.text().map(str::to_owned),
+        };
+        let named = list.iter().map(name).collect::<Option<Vec<_>>>().filter(|named| named.len() == axes);
+        named.ok_or_else(|| names.invalid(&allowed))
+    };
+    if !file.is_in(".zarray") {
+        return read(file.get("dimension_names"));
+    }
+    let key = if path.is_empty() { ".zattrs".to_owned() } else { format!("{path}/.zattrs") };
+    let Some(bytes) = keys.metadata(&key)? else { return Ok(Vec::new()) };
+    let file = keys.file(&key);
+    let attributes = json::parse(&file, &bytes)?;
+    read(Json::new(&file, &attributes).get("_ARRAY_DIMENSIONS"))
+}
+
 impl Metadata {
     /// Reads what a file with one of the two names holds.
     pub(super) fn read(file: &Json) -> Result<Self, VolumeError> {

@@ -9,7 +9,6 @@ mod blosc;
 mod codec;
 mod display;
 mod extension;
-mod half;
 #[cfg(feature = "http")]
 mod http;
 mod image;

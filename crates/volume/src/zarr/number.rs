@@ -2,8 +2,8 @@
 
 use serde_json::Value;
 
+use super::super::half;
 use super::super::sample_type::SampleType;
-use super::half;
 
 /// A type of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -16,6 +16,7 @@ mod holes;
 #[cfg(feature = "http")]
 mod http;
 mod in_memory;
+mod label_grids;
 mod limits;
 mod metaimage;
 mod mgh;
@@ -33,9 +34,11 @@ mod several;
 mod shared;
 mod shear;
 mod tiff;
+mod tiff_planes;
 mod values;
 mod vtk;
 mod zarr;
+mod zarr_axes;
 
 use std::cell::RefCell;
 use std::fs;

@@ -192,11 +192,11 @@ fn wrong_pages() {
     let grey = "grey or RGB pixels";
     refused("plain.tif", &[(256, 0)], "page 1", "invalid dimensions", grey);
     refused("plain.tif", &[(257, 3)], "page 2", "5 × 4 int32", "5 × 3 int32, as the first page");
-    refused("plain.tif", &[(258, 1)], "page 1", "Gray(1)", "an integer of 8 to 64 bits");
+    refused("plain.tif", &[(258, 1)], "page 1", "Gray(1)", "an integer of 1 or 8 to 64 bits");
     refused("plain.tif", &[(259, 50000)], "page 1", "ZSTD", grey);
     refused("plain.tif", &[(262, 3)], "ColorMap", "0 numbers", "768 numbers, of 8-bit indices");
     refused("plain.tif", &[(277, 2)], "page 1", "Multiband", "one sample a pixel");
-    refused("tiled.tif", &[(258, 16)], "page 1", "Gray(16), IEEEFP", "float of 32 or 64 bits");
+    refused("tiled.tif", &[(258, 16)], "page 2", "5 × 4 float32", "5 × 4 float16, as the first page");
     refused("plain.tif", &[(273, 1 << 20)], "page 1", "failed to fill whole buffer", grey);
     refused("plain.tif", &[(279, 79)], "page 1", "79 bytes for 80", "that holds its pixels");
     refused("plain.tif", &[(279, 1 << 20)], "page 1", "1048576 bytes of samples", "bytes that are left of the file");

@@ -39,6 +39,20 @@ fn of_vtk() {
     assert!(labels.values.iter().map(|&label| f32::from(label)).eq(values()));
 }
 
+/// VTK's writer writes the same text for either byte order: `SetByteOrderToBigEndian` changes nothing but this attribute.
+#[test]
+fn text_has_no_byte_order() {
+    use SampleType::{F32, F64, I16, I32, U8, U64};
+    let types = [("Int16", I16), ("UInt8", U8), ("Int32", I32), ("Float32", F32), ("Float64", F64), ("UInt64", U64)];
+    for (kind, sample_type) in types {
+        let text = String::from_utf8(replaced("text.vti", "byte_order=\"LittleEndian\"", "byte_order=\"BigEndian\""));
+        let text = text.unwrap().replace("Int16", kind);
+        let volume = Folder::new().open("text.vti", text.as_bytes()).unwrap();
+        assert_eq!(volume.values(), values(), "{kind}");
+        assert_eq!(volume.encoding().unwrap().sample_type, sample_type, "{kind}");
+    }
+}
+
 #[test]
 fn defaults_of_missing_attributes() {
     let folder = Folder::new();

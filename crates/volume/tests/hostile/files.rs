@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::UVec3;
 use sheetsplat_volume::{Labels, RawLayout, ReadOptions, SampleType, Volume, VolumeError};
 
-use crate::bounded::{Count, alone, bounded};
+use crate::bounded::{Count, alone, bounded, no_panic};
 use crate::fixtures;
 use crate::mutate::{Random, mutant};
 
@@ -118,7 +118,9 @@ fn damaged_files_are_volumes_or_errors() {
             fs::write(file, &mutant).unwrap();
             let what = format!("{}, mutant {round}", file.strip_prefix(folder.path()).unwrap().display());
             let values = |result: &Result<Volume, _>| result.as_ref().map_or(0, |volume| 4 * volume.values().len());
-            match bounded(&what, size(path), || open(path), values) {
+            let opened = bounded(&what, size(path), || open(path), values);
+            no_panic(&what, &opened);
+            match opened {
                 Ok(volume) => {
                     assert_eq!(volume.values().len(), volume.dims().element_product() as usize, "{what}");
                     assert!(
@@ -132,7 +134,7 @@ fn damaged_files_are_volumes_or_errors() {
             }
             if round % 4 == 0 {
                 let labels = |result: &Result<Labels, _>| result.as_ref().map_or(0, |labels| 2 * labels.values.len());
-                _ = bounded(&what, size(path), || Labels::open_with(path, &options(path)), labels);
+                no_panic(&what, &bounded(&what, size(path), || Labels::open_with(path, &options(path)), labels));
             }
             count.inputs += 1;
         }

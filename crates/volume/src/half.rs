@@ -18,6 +18,7 @@ fn value(bits: u16) -> f32 {
 }
 
 /// The nearest number of 16 bits, of two the even one.
+#[cfg(feature = "zarr")]
 pub(super) fn of(value: f64) -> u16 {
     let exponent = ((value.to_bits() >> 52 & 0x7ff) as i32 - 1023).max(-14);
     let bits = match exponent {
@@ -47,6 +48,7 @@ mod tests {
         assert!(value(0x7c01).is_nan());
     }
 
+    #[cfg(feature = "zarr")]
     #[test]
     fn every_half_is_its_own_nearest() {
         for bits in (0..=u16::MAX).filter(|&bits| !value(bits).is_nan()) {
