@@ -209,8 +209,7 @@ impl Volume {
         let StoreFacts { encoding, spacing: _, unit, value_unit, orientation, palette, .. } = facts;
         let StoreFacts { label_names, channel_name, display, time_names, series_names, .. } = facts;
         let volume = Self { encoding, unit, value_unit, palette, label_names, channel_name, display, ..self };
-        Self { time_names, series_names, ..volume }
-            .with_orientation(origin, orientation)
+        Self { time_names, series_names, ..volume }.with_orientation(origin, orientation)
     }
 
     /// What tells the times of the volume's file apart, from the first on, where that is more than their numbers.

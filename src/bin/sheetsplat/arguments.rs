@@ -21,7 +21,7 @@ use crate::outputs::Outputs;
 use crate::reading::Reading;
 
 /// The flags that set keys of the scene, in the order in which they are applied.
-const FLAGS: [(&str, &str); 14] = [
+const FLAGS: [(&str, &str); 15] = [
     ("--dims", "volume.dims"),
     ("--type", "volume.type"),
     ("--endian", "volume.endian"),

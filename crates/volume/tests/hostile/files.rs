@@ -6,9 +6,17 @@ use std::path::{Path, PathBuf};
 use glam::UVec3;
 use sheetsplat_volume::{Labels, RawLayout, ReadOptions, SampleType, Volume, VolumeError};
 
-use crate::bounded::{Count, alone, bounded, no_panic};
+use crate::bounded::{Count, alone, bounded};
 use crate::fixtures;
 use crate::mutate::{Random, mutant};
+
+/// Asserts that no decoder panicked: readers make an error of it, so that it would pass for damage that they saw.
+fn no_panic<T>(what: &str, result: &Result<T, VolumeError>) {
+    if let Err(error) = result {
+        let message = error.to_string();
+        assert!(!message.contains("a decoder that gave up"), "{what}: {message}");
+    }
+}
 
 /// The number of mutants for all readers together.
 const FILES: usize = 20_000;
