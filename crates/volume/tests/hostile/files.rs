@@ -11,7 +11,7 @@ use crate::fixtures;
 use crate::mutate::{Random, mutant};
 
 /// Asserts that no decoder panicked: readers make an error of it, so that it would pass for damage that they saw.
-fn no_panic<T>(what: &str, result: &Result<T, VolumeError>) {
+pub(crate) fn no_panic<T>(what: &str, result: &Result<T, VolumeError>) {
     if let Err(error) = result {
         let message = error.to_string();
         assert!(!message.contains("a decoder that gave up"), "{what}: {message}");

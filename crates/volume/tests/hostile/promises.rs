@@ -5,7 +5,8 @@ use std::fs;
 use glam::UVec3;
 use sheetsplat_volume::{ReadOptions, Volume, open_store};
 
-use crate::bounded::{ROOM, alone, bounded, no_panic};
+use crate::bounded::{ROOM, alone, bounded};
+use crate::files::no_panic;
 
 /// The number of bytes of code in every file.
 const CODE: usize = 1 << 20;
