@@ -109,3 +109,21 @@ impl Style {
         spread
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_grow_with_the_shorter_side_and_stay_readable() {
+        assert_eq!([64, 256, 1024].map(|side| em([side, 2 * side])), [8.0, 256.0 / 30.0, 1024.0 / 30.0]);
+        assert_eq!(em([1600, 900]), 30.0);
+    }
+
+    #[test]
+    fn ink_differs_from_its_background() {
+        let ink = |background| Style::of([64, 64], background).ink[0];
+        assert_eq!([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0], [0.4, 0.4, 0.4, 1.0]].map(ink), [1.0; 3]);
+        assert_eq!([[1.0, 1.0, 1.0, 1.0], [1.0, 1.0, 0.0, 1.0], [0.5, 0.5, 0.5, 1.0], [0.0; 4]].map(ink), [0.0; 4]);
+    }
+}
