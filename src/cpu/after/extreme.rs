@@ -3,12 +3,12 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, mask32x8};
 
-use super::classify::{Looks, mask};
+use super::classify::Looks;
 use super::frame::Frame;
 use super::planes::Plane;
 use crate::cpu::cut::TileRays;
 use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
-use crate::cpu::vector::LANES;
+use crate::cpu::vector::{LANES, mask};
 use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
 
