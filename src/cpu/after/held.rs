@@ -5,7 +5,6 @@ use std::ops::Range;
 use glam::{DVec3, UVec3};
 
 use super::cells::{Cells, Work, may_show};
-use super::extreme::is_choice;
 use super::frame::Frame;
 use super::matter::Matter;
 use super::needs::Needs;
@@ -115,7 +114,7 @@ impl Frame<'_> {
 
     /// The least and the greatest number with an opacity; `None` where all values count.
     fn shown(&self) -> Option<[f32; 2]> {
-        (!is_choice(self.compositing)).then_some(self.integrals.shown)
+        (!self.compositing.is_choice()).then_some(self.integrals.shown)
     }
 
     /// Whether no value between two has an opacity. If there are only holes, of which the minimum is the larger one, there is no value.
