@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
+use super::extent::RIM;
 use super::frame::Frame;
-use super::held::RIM;
 use super::low_pass::LowPass;
 use super::planes::Points;
 use super::tile::pixels_of;
