@@ -28,7 +28,7 @@ const NOTHING_CARRIED = vec4u(NO_NUMBER_BITS, 0u, 0u, NO_NUMBER_BITS);
 const NO_SAMPLE = vec4f(NO_NUMBER, 0.0, 0.0, 0.0);
 
 // Numbers that differ by less, relative to the range of all numbers, count as equal: in homogeneous matter only rounding tells them apart.
-const HAIR_OF_RANGE = 1e-5;
+const HAIR_OF_RANGE = 2e-6;
 
 // By how much of a cell the middles of rays are moved before their voxel is found: where cells meet, rounding would decide pixel by pixel.
 const HAIR_OF_CELL = 1e-3;

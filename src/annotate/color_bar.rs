@@ -3,9 +3,10 @@
 use glam::DVec3;
 
 use super::canvas::{empty, filled, lay, turned};
+use super::kind::refused;
 use super::round::ticks;
 use super::style::Style;
-use super::{refused, text};
+use super::text;
 use crate::SettingError;
 use crate::appearance::{categories, shown_range};
 use crate::image::Image;

@@ -3,8 +3,9 @@
 use glam::DMat3;
 
 use super::canvas::{empty, filled, lay};
+use super::kind::Annotation;
 use super::style::Style;
-use super::{Annotation, color_bar, legend, scale_bar, sides};
+use super::{color_bar, legend, scale_bar, sides};
 use crate::SettingError;
 use crate::image::Image;
 use crate::scene::Scene;

@@ -1,8 +1,9 @@
 //! The legend, which shows the colour of each label or, of several channels, of each channel.
 
 use super::canvas::{empty, filled, lay};
+use super::kind::refused;
 use super::style::Style;
-use super::{refused, text};
+use super::text;
 use crate::SettingError;
 use crate::appearance::{categories, shown_range};
 use crate::image::Image;

@@ -3,7 +3,7 @@
 /// The exponent of the largest power of ten up to a number above 0.
 fn exponent(number: f64) -> i32 {
     // The logarithm of a power of ten may be off by a rounding error.
-    (number.log10() + 1e-12).floor() as i32
+    (libm::log10(number) + 1e-12).floor() as i32
 }
 
 /// The largest round number up to a number above 0.

@@ -1,7 +1,7 @@
 //! The scale bar, which has a round length.
 
 use super::canvas::empty;
-use super::refused;
+use super::kind::refused;
 use super::round::{round_down, written};
 use super::style::Style;
 use super::text;

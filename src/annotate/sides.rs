@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec3};
 
-use super::refused;
+use super::kind::refused;
 use crate::SettingError;
 use crate::settings::Camera;
 use crate::volume::Volume;

@@ -142,6 +142,12 @@ pub(super) fn short_polynomial<S: Simd, V: SimdFloat<S, Element = f32>>(c: &[f32
     (cubic(c, 0, z) + fourth * cubic(c, 4, z)) + eighth * cubic(c, 8, z)
 }
 
+/// Lanes by bits.
+#[inline(always)]
+pub(super) fn mask<S: Simd>(simd: S, bits: u32) -> fearless_simd::mask32x8<S> {
+    fearless_simd::mask32x8::from_bitmask(simd, bits.into())
+}
+
 #[cfg(test)]
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {

@@ -3,7 +3,7 @@
 use crate::settings::splatting::{Classification, Compositing};
 
 /// Extremes that differ by less, relative to the range of the coefficients, count as equal, as where a whole image is drawn.
-const HAIR_OF_RANGE: f32 = 1e-5;
+const HAIR_OF_RANGE: f32 = 2e-6;
 
 /// The pixels of a part's region, row by row, before the background.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -122,6 +122,11 @@ impl Compositing {
         matches!(self, Self::Maximum | Self::Minimum | Self::Average | Self::Surface)
     }
 
+    /// Whether after splatting one value is chosen for a pixel.
+    pub(crate) fn is_choice(self) -> bool {
+        matches!(self, Self::Maximum | Self::Minimum | Self::Average)
+    }
+
     /// Whether opaque pixels hide what lies behind them; otherwise nothing can be culled (§6).
     pub fn hides(self) -> bool {
         matches!(self, Self::Linear | Self::Exponential | Self::Surface)

@@ -13,7 +13,7 @@ use crate::cpu::count::bits;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::cut::TileRays;
 use crate::cpu::sheets::{Buffers, CHANNELS, COLUMNS, ROWS};
-use crate::cpu::vector::LANES;
+use crate::cpu::vector::{LANES, mask};
 use crate::settings::splatting::Compositing;
 
 /// The field of eight pixels in a slab.
@@ -343,10 +343,4 @@ impl Frame<'_> {
         let numbers = &self.numbers;
         numbers.base + f64::from(number) / numbers.scale
     }
-}
-
-/// Lanes by bits.
-#[inline(always)]
-pub(super) fn mask<S: Simd>(simd: S, bits: u32) -> fearless_simd::mask32x8<S> {
-    fearless_simd::mask32x8::from_bitmask(simd, bits.into())
 }

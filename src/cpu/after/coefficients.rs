@@ -8,7 +8,6 @@ use super::bounds::Bounds;
 use super::cells::{Cells, Work};
 use super::colors::{Colors, ColorsOf};
 use super::differences::{Differences, MAX_VOXELS};
-use super::extreme::is_choice;
 use super::field::Field;
 use super::slab_integral::Integrals;
 use crate::after::brick_ranges::{Bearing, BrickRanges, values_of};
@@ -193,7 +192,7 @@ impl Coefficients {
         };
         let (bricks, wanted) = listed.unwrap_or_else(|| {
             let of_kernels = (&ranges.of_kernels, &ranges.reaches.0);
-            let is_wanted = match is_choice(compositing) {
+            let is_wanted = match compositing.is_choice() {
                 // A value without an opacity may be chosen.
                 true => vec![true; brick::bricks_per_axis(grid).element_product() as usize],
                 false => ranges.of_cells.shown(&values, bearing),
@@ -201,7 +200,7 @@ impl Coefficients {
             let wanted = (0..is_wanted.len() as u32).filter(|&brick| is_wanted[brick as usize]).collect();
             (shown_voxels(of_kernels, (volume, self.all(volume)), &values, bearing), wanted)
         });
-        let cells = (!is_choice(compositing)).then(|| {
+        let cells = (!compositing.is_choice()).then(|| {
             let shown = Integrals::new(volume.labels().is_some(), transfer, compositing, &self.numbers).shown;
             let all = self.all(volume);
             old_cells.filter(|(of, _)| *of == shown).unwrap_or_else(|| {

@@ -6,13 +6,13 @@ use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
 use glam::DVec3;
 
-use super::classify::{Slab, mask};
+use super::classify::Slab;
 use super::frame::Frame;
 use super::low_pass::LowPass;
 use super::planes::Plane;
 use crate::after::coefficients;
 use crate::cpu::count::bits;
-use crate::cpu::vector::LANES;
+use crate::cpu::vector::{LANES, mask};
 use crate::error::RenderError;
 use crate::volume::{Texel, Volume};
 

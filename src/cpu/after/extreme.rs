@@ -3,12 +3,12 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, mask32x8};
 
-use super::classify::{Looks, mask};
+use super::classify::Looks;
 use super::frame::Frame;
 use super::planes::Plane;
 use crate::cpu::cut::TileRays;
 use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
-use crate::cpu::vector::LANES;
+use crate::cpu::vector::{LANES, mask};
 use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
 
@@ -43,7 +43,7 @@ const BLACK: KeptColors = [[0.0; COLUMNS]; 4];
 impl Chosen {
     /// Empty, with or without colours; of no rows if nothing is chosen.
     pub(super) fn new(compositing: Compositing, has_colors: bool) -> Self {
-        let rows = if is_choice(compositing) { ROWS } else { 0 };
+        let rows = if compositing.is_choice() { ROWS } else { 0 };
         let colors = vec![[BLACK; 3]; if has_colors { rows } else { 0 }];
         Self { best: vec![NOTHING; rows], middle: vec![[NOTHING; 2]; rows], colors }
     }
@@ -101,11 +101,6 @@ impl Chosen {
         let rows = 0..self.best.len();
         rows.flat_map(|row| (0..COLUMNS).map(move |at| (row, at))).map(|(row, at)| of(row, at)).collect()
     }
-}
-
-/// Whether a compositing chooses one value for a pixel.
-pub(super) fn is_choice(compositing: Compositing) -> bool {
-    matches!(compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average)
 }
 
 /// The position of the middle of a stretch: its slab, and the fraction of the slab before it.

@@ -7,7 +7,6 @@ use fearless_simd::Level;
 use fearless_simd::prelude::*;
 use glam::{DVec3, UVec3};
 
-use super::extreme::is_choice;
 use super::field::Field;
 use super::low_pass::LowPass;
 use super::matter::Matter;
@@ -91,7 +90,7 @@ const WANTED: u8 = 1;
 const DRAWN: u8 = 2;
 
 /// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
-const HAIR_OF_RANGE: f32 = 1e-5;
+const HAIR_OF_RANGE: f32 = 2e-6;
 
 impl<'a> Frame<'a> {
     /// A channel's frame in a view, the one that the coefficients were looked at in.
@@ -196,7 +195,7 @@ impl<'a> Frame<'a> {
         };
         let placed = frames.iter().map(place).collect::<Vec<_>>().concat();
         let has_hits = first.compositor.first_hit.is_some();
-        let has_extremes = first.resolver.is_none() && is_choice(first.compositing);
+        let has_extremes = first.resolver.is_none() && first.compositing.is_choice();
         let (content, first_hits, tally) = draw_tiles(
             (size, &first.region),
             Outputs { has_hits, has_extremes },
@@ -237,7 +236,7 @@ impl<'a> Frame<'a> {
 
     /// Whether each pixel's ray is searched for the value that it chooses.
     pub(super) fn is_searched(&self) -> bool {
-        is_choice(self.compositing) && matches!(self.matter, Matter::Whole { .. })
+        self.compositing.is_choice() && matches!(self.matter, Matter::Whole { .. })
     }
 
     /// The slabs whose sheets may hold anything in any channel.

@@ -5,63 +5,20 @@ use std::ops::Range;
 use glam::{DVec3, UVec3};
 
 use super::cells::{Cells, Work, may_show};
-use super::extreme::is_choice;
+use super::extent::{Extent, Held, RIM};
 use super::frame::Frame;
 use super::matter::Matter;
 use super::needs::Needs;
 use super::place::Placement;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::sheets::{COLUMNS, ROWS};
-use crate::volume::{Grid, ValueSlice, Values, Volume};
+use crate::volume::{ValueSlice, Values, Volume};
 
 /// The depth of the slabs whose voxels are held together, in voxels: deeper ones copy less often what neighbouring slabs share.
 const DEPTH: f64 = 8.0;
 
 /// A value, its bits, and the copies with which those of cells are computed.
 const BYTES_PER_VOXEL: f64 = 7.0;
-
-/// Voxels around those that kernels reach: for the cells of points on borders, rounded, and for differences between neighbours.
-pub(super) const RIM: f64 = 2.0;
-
-/// A box of a volume's voxels.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Extent {
-    /// The volume's voxels along each axis.
-    pub(super) dims: UVec3,
-    /// The first voxel of the box.
-    pub(super) low: UVec3,
-    /// Its voxels along each axis.
-    pub(super) held: UVec3,
-}
-
-impl Extent {
-    /// All voxels.
-    pub(super) fn whole(grid: &Grid) -> Self {
-        Self { dims: grid.dims, low: UVec3::ZERO, held: grid.dims }
-    }
-
-    /// The index of one of the voxels in the box.
-    #[inline(always)]
-    pub(super) fn index(&self, voxel: UVec3) -> usize {
-        let [x, y, z] = (voxel - self.low).to_array().map(|n| n as usize);
-        x + self.held.x as usize * (y + self.held.y as usize * z)
-    }
-}
-
-/// The voxels around the points of some slabs' open pixels.
-#[derive(Debug)]
-pub(super) struct Held {
-    /// The slabs.
-    pub(super) slabs: Range<i32>,
-    pub(super) extent: Extent,
-    pub(super) volume: Volume,
-    /// Where values can meet an opacity; `None` where all values count.
-    pub(super) cells: Option<Cells>,
-    /// Whether no value can meet an opacity.
-    pub(super) is_blank: bool,
-    /// The chunks that share voxels with the box, and whose voxels nothing needed when it was copied: there are holes in their place.
-    missing: Vec<u32>,
-}
 
 impl Held {
     /// Whether the voxels suffice for the open pixels of a tile, given by its first pixel, in a slab.
@@ -115,7 +72,7 @@ impl Frame<'_> {
 
     /// The least and the greatest number with an opacity; `None` where all values count.
     fn shown(&self) -> Option<[f32; 2]> {
-        (!is_choice(self.compositing)).then_some(self.integrals.shown)
+        (!self.compositing.is_choice()).then_some(self.integrals.shown)
     }
 
     /// Whether no value between two has an opacity. If there are only holes, of which the minimum is the larger one, there is no value.

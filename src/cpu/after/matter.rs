@@ -8,7 +8,7 @@ use super::cells::Cells;
 use super::coefficients::Coefficients;
 use super::colors::ColorsOf;
 use super::differences::Differences;
-use super::held::Extent;
+use super::extent::Extent;
 use crate::after::brick_ranges::BrickRanges;
 use crate::after::normalization::Normalization;
 use crate::cpu::stream::Stream;

@@ -16,6 +16,7 @@ mod classify;
 mod coefficients;
 mod colors;
 mod differences;
+mod extent;
 mod extreme;
 mod field;
 mod frame;

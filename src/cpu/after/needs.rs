@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use glam::{DVec3, UVec3};
 
-use super::extreme::is_choice;
+use super::extent::RIM;
 use super::frame::Frame;
-use super::held::RIM;
 use super::low_pass::LowPass;
 use super::planes::Points;
 use super::tile::pixels_of;
@@ -72,7 +71,7 @@ impl<'a> Needs<'a> {
     fn reaches(&self, (low, dims): (UVec3, UVec3), pixels: &Pixels) -> bool {
         let Self { frame, open, .. } = self;
         let has_gradient =
-            frame.needs_gradients || frame.compositing == Compositing::Surface || is_choice(frame.compositing);
+            frame.needs_gradients || frame.compositing == Compositing::Surface || frame.compositing.is_choice();
         let all = frame.grid.dims.as_dvec3();
         let beyond = frame.placement.slab_step() + 0.5 + SLACK;
         self.planes.iter().flatten().any(|(points, low_pass)| {

@@ -6,8 +6,8 @@ use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, i32x8, u32x8};
 use glam::DVec3;
 
+use super::extent::{Extent, Held};
 use super::field::Weights;
-use super::held::{Extent, Held};
 use super::low_pass::LowPass;
 use crate::cpu::project::floor;
 use crate::cpu::sheets::{COLUMNS, ROWS};

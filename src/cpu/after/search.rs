@@ -23,7 +23,7 @@ use crate::cpu::vector::LANES;
 use crate::settings::splatting::Compositing;
 
 /// Rounding errors of means, relative to the numbers' range, which is about 1.
-const SLACK: f32 = 4e-6;
+const SLACK: f32 = 3e-6;
 
 /// A plane and eight pixels' points on it.
 #[derive(Clone, Copy, Debug)]

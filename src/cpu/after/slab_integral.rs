@@ -6,11 +6,10 @@ use std::collections::BTreeMap;
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x8, f32x16, i32x8};
 
-use super::classify::mask;
 use crate::after::normalization::Normalization;
 use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
 use crate::cpu::count::bits;
-use crate::cpu::vector::{LANES, columns, optical_depth};
+use crate::cpu::vector::{LANES, columns, mask, optical_depth};
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
 

@@ -9,7 +9,7 @@ use super::classify::{Looks, Slab};
 use super::frame::Frame;
 use super::planes::Plane;
 use crate::cpu::sheets::Buffers;
-use crate::cpu::vector::LANES;
+use crate::cpu::vector::{LANES, mask};
 use crate::settings::transfer_function::Tables;
 
 /// The opacity of a surface.
@@ -85,7 +85,7 @@ impl Frame<'_> {
         let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * place);
         let color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
         let [red, green, blue] = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
-        let is_found = super::classify::mask(simd, found);
+        let is_found = mask(simd, found);
         let put = |pixels: &mut [f32], new: f32x8<S>| {
             let old = f32x8::from_slice(simd, pixels);
             is_found.select(new, old).store_slice(pixels);

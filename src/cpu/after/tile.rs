@@ -9,7 +9,7 @@ use std::sync::Arc;
 use fearless_simd::Simd;
 
 use super::classify::Looks;
-use super::extreme::{Chosen, is_choice};
+use super::extreme::Chosen;
 use super::frame::Frame;
 use super::place::ScreenBox;
 use super::planes::Plane;
@@ -105,7 +105,7 @@ impl<'a> TileWalk<'a> {
         } else if let Some(first) = bricks.peek().map(|placed| placed.first) {
             self.reset(origin, first);
             self.walk(simd, first, &mut bricks);
-            if is_choice(self.frame.compositing) {
+            if self.frame.compositing.is_choice() {
                 let Self { frame, rays, to_eye, buffers, chosen, .. } = self;
                 frame.classify_chosen(simd, &Looks::new(self.origin, rays, to_eye), chosen, buffers);
             }
@@ -241,14 +241,14 @@ impl<'a> TileWalk<'a> {
         for channel in channels.iter_mut().filter(|channel| !channel.active.is_empty()) {
             let wanted = channel.wanted(open);
             let Channel { frame, planes, .. } = channel;
-            if is_choice(frame.compositing) {
+            if frame.compositing.is_choice() {
                 frame.choose(simd, &looks, planes, &wanted, chosen);
             } else {
                 frame.find_wide(simd, slab, &looks, planes, &wanted);
                 frame.classify(simd, slab, &looks, planes, &wanted, open, (sheet, buffers));
             }
         }
-        if is_choice(frame.compositing) || frame.compositing == Compositing::Surface {
+        if frame.compositing.is_choice() || frame.compositing == Compositing::Surface {
             return;
         }
         let begin = rays.begin(slab);

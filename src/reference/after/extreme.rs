@@ -60,7 +60,7 @@ fn points<'a>(pixel: &'a Pixel) -> impl Iterator<Item = (i32, f64)> + 'a {
 }
 
 /// Values that differ by less, relative to the range of the coefficients, count as equal: in homogeneous matter only rounding tells them apart.
-const HAIR_OF_RANGE: f64 = 1e-5;
+const HAIR_OF_RANGE: f64 = 2e-6;
 
 /// The point with the maximum or minimum value, the nearest of equal ones.
 fn extreme(pixel: &Pixel, is_minimum: bool) -> Option<Point> {

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 use super::colors::ColorsOf;
 use super::differences::Differences;
-use super::held::{Extent, Held};
+use super::extent::{Extent, Held};
 use super::low_pass::LowPass;
 use super::planes::Points;
 use crate::after::normalization::Normalization;

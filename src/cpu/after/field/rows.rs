@@ -7,7 +7,7 @@ use glam::{DVec3, UVec3};
 
 use super::{Field, MIN_WEIGHT};
 use crate::cpu::after::colors::Color;
-use crate::cpu::after::held::Extent;
+use crate::cpu::after::extent::Extent;
 use crate::cpu::after::low_pass::LowPass;
 use crate::cpu::vector::{LANES, exp2, iota};
 use crate::volume::ValueSlice;
