@@ -58,7 +58,7 @@ mod tests {
     fn letters_are_those_of_radiology_whatever_the_axes() {
         let ras = [DVec3::X, DVec3::Y, DVec3::Z];
         let lps = [DVec3::NEG_X, DVec3::NEG_Y, DVec3::Z];
-        let sagittal = [DVec3::NEG_Y, DVec3::NEG_Z, DVec3::NEG_X];
+        let sagittal = [DVec3::NEG_Y, DVec3::Z, DVec3::NEG_X];
         for axes in [ras, lps, sagittal] {
             // Left, right, top, bottom: in front of patients, their right is on the left.
             for (side, expected) in [
@@ -72,6 +72,8 @@ mod tests {
                 assert_eq!(seen(axes, side), expected, "{axes:?} {side:?}");
             }
         }
+        // A picture of left-handed axes is mirrored, and its letters say so.
+        assert_eq!(seen([DVec3::NEG_X, DVec3::Y, DVec3::Z], PatientSide::Front), ["L", "R", "S", "I"]);
     }
 
     #[test]

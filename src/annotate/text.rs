@@ -102,10 +102,10 @@ mod tests {
     #[test]
     fn letters_grow_with_the_font() {
         for em in [8.0, 16.0, 33.0, 54.0_f32] {
-            let [first, last] = rows("RLAPSI", em);
+            let [first, last] = rows("RLAPI", em);
             let height = (last - first + 1) as f32;
-            // Capitals of DejaVu are 0.729 em high.
-            assert!((height - 0.729 * em).abs() <= 1.5, "{em}: {height}");
+            // Capitals of DejaVu without curves are 0.729 em high, and touch at most two rows more than that.
+            assert!((-0.01..2.0).contains(&(height - 0.729 * em)), "{em}: {height}");
             let [_, descent] = rows("gjpqy", em);
             assert!(descent > last && (descent as u32) < line(em), "{em}: a line holds descenders");
         }

@@ -293,9 +293,9 @@ impl Scene {
             },
             ..Splatting::default()
         };
-        let is_open = preset.is_none() && !states_transfer;
-        let fitting = if is_open { tables::fitting(&shading, &splatting) } else { Fitting::NONE };
         let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
+        let is_open = preset.is_none() && !states_transfer && channels.len() <= 1;
+        let fitting = if is_open { tables::fitting(&shading, &splatting) } else { Fitting::NONE };
         let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } =
             channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
         let scene = Self {

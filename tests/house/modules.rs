@@ -11,7 +11,7 @@ use circles::Files;
 /// The folders of crates, without `bin`, and the circles of files in each: a file of the circle, and the number of its files. Circles make it hard to read
 /// one file without the others, so they may only shrink.
 const CIRCLES: [(&str, &[(&str, usize)]); 3] = [
-    ("src", &[("cpu", 21), ("headless", 5)]),
+    ("src", &[("cpu", 20), ("headless", 5)]),
     ("src/bin/sheetsplat", &[]),
     ("crates/volume/src", &[("zarr/codec", 2)]),
 ];
