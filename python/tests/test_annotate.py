@@ -19,9 +19,9 @@ def test_words_are_the_bytes_of_the_program() -> None:
 
 
 def test_views_keep_words_when_the_scene_changes() -> None:
-    view = sheetsplat.View(SOURCE, image=SIZE, annotate="scale")
+    view = sheetsplat.View(SOURCE, image=SIZE, camera={"height": 20, "direction": [0, 1, 0]}, annotate="scale")
     first = np.asarray(view.render())
-    second = np.asarray(view.render(camera={"direction": [1, 0, 0]}))
+    second = np.asarray(view.render(camera={"height": 20, "direction": [1, 0, 0]}))
     assert first.shape == second.shape == (160, 200, 4)
     # The bar at the bottom is there in both.
     np.testing.assert_array_equal(first[-6:-4, :12], second[-6:-4, :12])

@@ -104,8 +104,8 @@ mod tests {
         for em in [8.0, 16.0, 33.0, 54.0_f32] {
             let [first, last] = rows("RLAPI", em);
             let height = (last - first + 1) as f32;
-            // Capitals of DejaVu without curves are 0.729 em high, and touch at most two rows more than that.
-            assert!((-0.01..2.0).contains(&(height - 0.729 * em)), "{em}: {height}");
+            // Capitals of DejaVu without curves are 0.729 em high. Rows count of which 0.3 have ink: at each end 0.3 rows may be lost, or 0.7 won.
+            assert!((-0.6..1.4).contains(&(height - 0.729 * em)), "{em}: {height}");
             let [_, descent] = rows("gjpqy", em);
             assert!(descent > last && (descent as u32) < line(em), "{em}: a line holds descenders");
         }
