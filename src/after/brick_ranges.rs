@@ -148,7 +148,7 @@ fn strided(ends: &[[f32; 2]], stride: usize, count: usize, reach: usize) -> Vec<
     ends.par_chunks(stride * count).flat_map_iter(|block| around_bricks(block, stride, reach)).collect()
 }
 
-/// The ranges around bricks along the outermost axis of a block, whose steps are `stride` apart. Of groups as long as what is around a brick, the
+/// The ranges around bricks along the outermost axis of a block, whose steps are `stride` apart. Over groups as long as what is around a brick, the
 /// range from the group's start to each step, and from each step to its end, is found once: what is around a brick lies in two groups (van Herk 1992,
 /// doi:10.1016/0167-8655(92)90069-C), so that the time does not grow with the reach, which is long where a picture is small.
 fn around_bricks(block: &[[f32; 2]], stride: usize, reach: usize) -> Vec<[f32; 2]> {

@@ -12,7 +12,7 @@ pub(super) fn empty(size: [u32; 2]) -> Image {
     filled(size, [0.0; 4])
 }
 
-/// Draws an image over another one, with its upper left corner at a pixel. What lies outside is left out.
+/// Draws an image over another one, with its upper left corner at a pixel. The part outside is left out.
 pub fn lay(image: &mut Image, [left, top]: [u32; 2], above: &Image) {
     for (pixel, at) in above.pixels.iter().zip(0..) {
         over(image, [left + at % above.width, top + at / above.width], *pixel);

@@ -23,7 +23,7 @@ const BAR_GAP: f32 = 0.8;
 /// The share of the room's height that a bar takes.
 const SHARE: f64 = 0.6;
 
-/// The bar with the colours of visible values before shading; in projections scaled by their opacities. Of several channels, each that shows something
+/// The bar with the colours of visible values before shading; in projections scaled by their opacities. With several channels, each that shows something
 /// has its own, with its name, except volumes of colours and label maps. `room` is the greatest height in pixels.
 pub(super) fn plate(
     scene: &Scene,

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use crate::SettingError;
 
-/// What can stand beside a picture.
+/// The words that can stand beside a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Annotation {

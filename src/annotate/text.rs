@@ -16,7 +16,7 @@ static FONT: LazyLock<FontRef<'static>> = LazyLock::new(|| {
 const LINE: f32 = 1.2;
 const BASELINE: f32 = 0.95;
 
-/// What stands for characters that the font lacks.
+/// The character that stands for those that the font lacks.
 const UNKNOWN: char = '\u{fffd}';
 
 /// The mark of omitted text.
@@ -42,7 +42,7 @@ pub fn fitted(text: &str, em: f32, room: u32) -> String {
     ends.iter().rev().map(shortened).find(|shortened| width(shortened, em) <= room).unwrap_or_default()
 }
 
-/// Writes a line with its upper left corner at a pixel, in a colour with alpha 1. What lies outside the image is left out.
+/// Writes a line with its upper left corner at a pixel, in a colour with alpha 1. The part outside the image is left out.
 pub fn write(image: &mut Image, [left, top]: [u32; 2], text: &str, em: f32, ink: [f32; 3]) {
     let scale = scale(em);
     let baseline = (em * BASELINE).round();

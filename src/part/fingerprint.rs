@@ -15,7 +15,10 @@ const DOMAIN: &str = "sheetsplat part 1\n";
 /// # Errors
 /// If the scene cannot be written as TOML.
 pub fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, SceneError> {
-    let explicit = scene.explicit(volume.sample());
+    let mut explicit = scene.explicit(volume.sample());
+    if let OpenVolume::Streamed(_) = volume {
+        explicit.splatting = explicit.splatting.streamed();
+    }
     let mut hash = blake3::Hasher::new();
     hash.update(DOMAIN.as_bytes()).update(settings(explicit)?.as_bytes());
     let grid = volume.grid();

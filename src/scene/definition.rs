@@ -51,7 +51,7 @@ pub struct Scene {
     pub shading: Shading,
     /// Kernel, slabs, compositing, culling.
     pub splatting: Splatting,
-    /// What the preset that fits the volume chooses.
+    /// The settings that the preset that fits the volume chooses.
     pub fitting: Fitting,
 }
 

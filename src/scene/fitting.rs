@@ -4,7 +4,7 @@ use crate::appearance::Preset;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Splatting;
 
-/// What the preset that fits the volume ([`Preset::suggested`]) chooses for a scene without a transfer function: these settings, as long as they have
+/// The choice of the preset that fits the volume ([`Preset::suggested`]), for a scene without a transfer function: these settings, as long as they have
 /// their defaults, besides colours and opacities. Others than the defaults count as stated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fitting {
@@ -25,10 +25,10 @@ pub struct Fitting {
 }
 
 impl Fitting {
-    /// Of a scene that states everything, or names a preset.
+    /// A scene states everything, or names a preset.
     pub const NONE: Self = Self::all(false);
 
-    /// Of a scene that states nothing.
+    /// A scene states nothing.
     pub const ALL: Self = Self::all(true);
 
     const fn all(is: bool) -> Self {

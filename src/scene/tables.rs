@@ -330,7 +330,7 @@ pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shad
     Ok(shading)
 }
 
-/// What a preset may choose of `[shading]` and `[splatting]`: the keys that are missing.
+/// The choices that are left to a preset in `[shading]` and `[splatting]`: the keys that are missing.
 pub(super) fn fitting(shading: &Section, splatting: &Section) -> Fitting {
     let is_open = |key: &str| !shading.states(key);
     Fitting {

@@ -49,7 +49,7 @@ impl Scene {
         }
         write_image(&mut text, image);
         write_clip(&mut text, clip);
-        // What the preset that fits is to choose is not written.
+        // Settings that the preset that fits is to choose are not written.
         let fitting = if self.is_fitting() { *fitting } else { Fitting::NONE };
         write_shading(&mut text, shading, fitting);
         write_splatting(&mut text, splatting, fitting);

@@ -68,7 +68,6 @@ fn a_misspelt_key_suggests_the_key() {
     run.assert_failure(2, &["--set: splatting.slab_with", "an unknown key (perhaps slab_width)", "allowed: method"]);
 }
 
-/// Modules and times are for those who ask for a log.
 #[test]
 fn a_window_is_short_for_opacities_and_excludes_others() {
     let folder = Folder::new();
@@ -90,6 +89,7 @@ fn a_window_is_short_for_opacities_and_excludes_others() {
     assert!(!folder.path("out.png").exists());
 }
 
+/// Modules and times are for those who ask for a log.
 #[test]
 fn warnings_are_plain_and_come_once() {
     let folder = Folder::new();

@@ -51,7 +51,7 @@ const ZARR: &str = "Zarr";
 /// Formats whose files, if they are uncompressed, are read by boxes.
 const SEEKABLE: [&str; 4] = ["NRRD", "NIfTI", "MetaImage", "NPY"];
 
-/// What volumes allow that are not of a format with several series.
+/// The allowed choice of volumes whose format has no series.
 const NO_SERIES: &str = "no series, which only DICOM has";
 
 /// Formats with one slice per file of a folder.

@@ -9,7 +9,7 @@ use super::error::volume::{VolumeError, invalid};
 /// Runs a reader of the file at `path`. Other crates decode much of what readers read, and some panic at files that they do not expect.
 ///
 /// # Errors
-/// Those of the reader, and one with the words of a panic.
+/// The reader's errors, and one with the words of a panic.
 pub(super) fn guarded<T>(path: &Path, run: impl FnOnce() -> Result<T, VolumeError>) -> Result<T, VolumeError> {
     // The reader's state is gone with the panic.
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| {

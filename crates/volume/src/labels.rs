@@ -88,7 +88,7 @@ impl Volume {
     /// `has_spacing` says that the labels' spacing does not count.
     ///
     /// # Errors
-    /// As for [`Labels::open_with`] and [`Self::with_labels`], and if the labels lie nowhere in the volume.
+    /// The errors of [`Labels::open_with`] and [`Self::with_labels`], and one if the labels lie nowhere in the volume.
     #[doc(hidden)]
     pub fn with_labels_of(self, path: &Path, has_spacing: bool, access: &Access) -> Result<Self, VolumeError> {
         let (labels, orientation) = Labels::oriented(path, access)?;

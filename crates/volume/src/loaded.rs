@@ -34,7 +34,7 @@ pub(super) struct Loaded<T: Voxel> {
     pub(super) series: Series,
     /// The names of the file's channels, from the first on; there may be fewer than channels.
     pub(super) channel_names: Vec<String>,
-    /// What tells the file's times apart, from the first on; there may be fewer than times.
+    /// The marks that tell the file's times apart, from the first on; there may be fewer than times.
     pub(super) time_names: Vec<String>,
     /// The series among which the folder's was chosen.
     pub(super) series_names: Vec<String>,

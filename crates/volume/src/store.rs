@@ -112,7 +112,7 @@ pub struct StoreFacts {
     pub channel_name: Option<String>,
     /// How the channel is shown.
     pub display: Option<ChannelDisplay>,
-    /// What tells the file's times apart, from the first on, where that is more than their numbers.
+    /// The marks that tell the file's times apart, from the first on, where they are more than their numbers.
     pub time_names: Vec<String>,
     /// The series among which a folder's was chosen, in the order of their numbers from 0; empty if there is only one.
     pub series_names: Vec<String>,

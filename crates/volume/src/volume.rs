@@ -212,7 +212,7 @@ impl Volume {
         Self { time_names, series_names, ..volume }.with_orientation(origin, orientation)
     }
 
-    /// What tells the times of the volume's file apart, from the first on, where that is more than their numbers.
+    /// The marks that tell the times of the volume's file apart, from the first on, where they are more than their numbers.
     pub fn time_names(&self) -> &[String] {
         &self.time_names
     }

@@ -118,7 +118,7 @@ struct Look {
     #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Colormap::ALL.map(|(name, _)| name)))]
     colormap: Option<String>,
     /// Opacities from 0 at the value LO and below to 1 at HI and above, in place of the scene's: short for --set transfer.opacity=[[LO,0],[HI,1]].
-    /// Of a MIP, the window of its brightness.
+    /// It is the window of a MIP's brightness.
     #[arg(long, value_name = "LO,HI", allow_hyphen_values = true, value_parser = parse_window)]
     window: Option<[f64; 2]>,
 }
@@ -238,7 +238,7 @@ impl Input {
         Ok(scene)
     }
 
-    /// What the flags are short for, with a time to be shown.
+    /// The settings that the flags are short for, with a time to be shown.
     fn flags(&self, time: Option<&str>) -> impl Iterator<Item = String> {
         let Self { raw: Raw { dims, r#type, endian, offset, spacing, channel, time: _, level, series }, look, .. } =
             self;

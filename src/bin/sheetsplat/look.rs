@@ -1,4 +1,4 @@
-//! What is told of a picture's appearance where the scene leaves it to the volume.
+//! Words about a picture's appearance where the scene leaves it to the volume.
 
 use sheetsplat::appearance::{Eye, Preset};
 use sheetsplat::scene::Scene;

@@ -32,7 +32,7 @@ struct Visit {
     most: [f32; LANES],
     /// The pixels whose stretches hold their points.
     counted: u32,
-    /// Those whose values are known.
+    /// The pixels whose values are known.
     known: u32,
     /// The greatest of the bounds; -∞ once the plane has been visited.
     bound: f32,
@@ -248,7 +248,7 @@ impl Search {
         }
     }
 
-    /// What eight pixels choose from the values that are known.
+    /// The choices of eight pixels from the values that are known.
     #[inline(always)]
     fn choices(&self, frame: &Frame<'_>) -> Choices {
         let mut choices = [None; LANES];

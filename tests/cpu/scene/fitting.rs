@@ -113,7 +113,7 @@ fn stated_keys_win_over_the_preset_that_fits() {
     assert_eq!(fitted.splatting.compositing, Compositing::Maximum);
 }
 
-/// What the preset is to choose stays open in a scene that is written.
+/// Settings that the preset is to choose stay open in a scene that is written.
 #[test]
 fn open_scenes_stay_open() {
     for text in [

@@ -218,7 +218,7 @@ impl Parser {
                 break;
             }
             if header.length == UNDEFINED && header.has_fragments {
-                // Those of an icon, say, or of a private element.
+                // They are the pixels of an icon, say, or of a private element.
                 self.pixels(&header)?;
             } else if header.length == UNDEFINED || header.is_sequence {
                 self.sequence(&header, end, depth, &mut data)?;

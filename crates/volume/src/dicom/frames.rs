@@ -20,9 +20,9 @@ pub(super) struct Frame {
     pub(super) thickness: Option<f64>,
     /// Slope and intercept.
     pub(super) rescale: [f64; 2],
-    /// What rescaled values are, such as `HU`.
+    /// The unit of rescaled values, such as `HU`.
     pub(super) rescale_type: Option<Arc<str>>,
-    /// What the frame states about itself that tells images at one place apart.
+    /// The frame's statements that tell images at one place apart.
     pub(super) marked: Marked,
 }
 
@@ -119,7 +119,7 @@ pub(super) fn read(data: &Dataset, count: usize) -> Result<(Vec<Frame>, Option<A
     Ok((frames, assumed))
 }
 
-/// What a file of several frames lacks, so that these are taken to be stacked.
+/// The element that a file of several frames lacks, so that these are taken to be stacked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Assumed {
     /// The distance between frames.

@@ -34,7 +34,7 @@ pub(super) struct Slice {
 pub(super) struct Chosen {
     pub(super) images: Vec<Image>,
     pub(super) slices: Vec<Slice>,
-    /// What there is to choose from, if it is more than one thing.
+    /// The series to choose from, if there are several.
     pub(super) listed: Vec<String>,
 }
 

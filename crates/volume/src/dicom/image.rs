@@ -21,7 +21,7 @@ const DIRECTORY: &str = "1.2.840.10008.1.3.10";
 /// The photometric interpretation of pixels that are indices of a palette.
 const INDICES: &str = "PALETTE COLOR";
 
-/// What a file says about the series that it belongs to.
+/// A file's statements about the series that it belongs to.
 pub(super) struct Belonging {
     pub(super) path: PathBuf,
     pub(super) series: String,
@@ -49,9 +49,9 @@ pub(super) struct Image {
     /// The instance's identity and number, each empty if the file does not state it.
     pub(super) instance: String,
     pub(super) number: String,
-    /// What the file states about all its frames that tells images at one place apart.
+    /// The file's statements about all its frames that tell images at one place apart.
     pub(super) marked: Marked,
-    /// What is missing, so that frames were placed by defaults.
+    /// The missing element, for want of which frames were placed by defaults.
     pub(super) assumed: Option<Assumed>,
     pub(super) pixels: Pixels,
     /// The values of samples, if a table states them.

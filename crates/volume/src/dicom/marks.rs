@@ -1,4 +1,4 @@
-//! What tells images at one place apart: times, b-values, echoes, types.
+//! Marks that tell images at one place apart: times, b-values, echoes, types.
 
 use std::cmp::Ordering;
 use std::sync::Arc;

@@ -127,7 +127,7 @@ fn tell_apart(images: &[Image], told: &mut [Told], most: usize) -> Vec<usize> {
     for mark in 0..MARKS.len() {
         let value = |told: &Told| mark_of(images, &told.slice, mark);
         let values: BTreeSet<&str> = told.iter().map(value).collect();
-        // What varies with the place is no time or channel.
+        // A mark that varies with the place is no time or channel.
         if values.len() < 2 || values.len() > most {
             continue;
         }

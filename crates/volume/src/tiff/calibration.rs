@@ -1,4 +1,4 @@
-//! What a file states about its pages.
+//! A file's statements about its pages.
 
 use super::super::display::ChannelDisplay;
 use super::stack::{Runs, Stack};
@@ -11,7 +11,7 @@ pub(super) struct Calibration {
     /// The spacing along z; ignored where x and y have none.
     pub(super) between_slices: Option<f64>,
     pub(super) unit: Option<String>,
-    /// What the pages show.
+    /// The order of the pages.
     pub(super) stack: Option<Stack>,
     /// Where pages are not in the stack's order.
     pub(super) runs: Runs,

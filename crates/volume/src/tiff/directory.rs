@@ -48,10 +48,25 @@ fn find(file: &mut BufReader<File>, most: u64) -> io::Result<Option<(u16, u64)>>
     Ok(None)
 }
 
-/// The position of the low byte of a tag's value, in the directory at `directory`, if the tag has one 16-bit value.
-pub(super) fn low_byte_of(file: &mut (impl Read + Seek), directory: u64, tag: u16) -> io::Result<Option<u64>> {
-    /// The type code of 16-bit values.
-    const SHORT: u64 = 3;
+/// An entry of a directory.
+struct Entry {
+    tag: u64,
+    kind: u64,
+    values: u64,
+    /// The position of its value, if that is short enough, or else of the value's position.
+    at: u64,
+    value_or_offset: u64,
+    /// The bytes that a value may take in the entry.
+    room: u64,
+    big_endian: bool,
+}
+
+/// Visits the entries of the directory at `directory`, until one has a result.
+fn visit<T>(
+    file: &mut (impl Read + Seek),
+    directory: u64,
+    mut result: impl FnMut(Entry) -> Option<T>,
+) -> io::Result<Option<T>> {
     let mut magic = [0; 4];
     file.rewind()?;
     file.read_exact(&mut magic)?;
@@ -59,39 +74,40 @@ pub(super) fn low_byte_of(file: &mut (impl Read + Seek), directory: u64, tag: u1
     let (offset, count) = if is_big { (8, 8) } else { (4, 2) };
     file.seek(SeekFrom::Start(directory))?;
     for _ in 0..number(file, count, big_endian)? {
-        let found = number(file, 2, big_endian)?;
+        let tag = number(file, 2, big_endian)?;
         let kind = number(file, 2, big_endian)?;
         let values = number(file, offset, big_endian)?;
         let at = file.stream_position()?;
-        let _value_or_offset = number(file, offset, big_endian)?;
-        if (found, kind, values) == (tag.into(), SHORT, 1) {
-            return Ok(Some(at + u64::from(big_endian)));
+        let value_or_offset = number(file, offset, big_endian)?;
+        let entry = Entry { tag, kind, values, at, value_or_offset, room: offset as u64, big_endian };
+        if let Some(result) = result(entry) {
+            return Ok(Some(result));
         }
     }
     Ok(None)
+}
+
+/// The position of the low byte of a tag's value, in the directory at `directory`, if the tag has one 16-bit value.
+pub(super) fn low_byte_of(file: &mut (impl Read + Seek), directory: u64, tag: u16) -> io::Result<Option<u64>> {
+    /// The type code of 16-bit values.
+    const SHORT: u64 = 3;
+    visit(file, directory, |entry| {
+        let is_it = (entry.tag, entry.kind, entry.values) == (tag.into(), SHORT, 1);
+        is_it.then_some(entry.at + u64::from(entry.big_endian))
+    })
 }
 
 /// The position and length of the text of every description in the directory at `directory`, in the order of the entries: some programs write two.
 pub(super) fn descriptions(file: &mut (impl Read + Seek), directory: u64) -> io::Result<Vec<(u64, u64)>> {
     /// The type codes of bytes and of text.
     const BYTES: [u64; 2] = [1, 2];
-    let mut magic = [0; 4];
-    file.rewind()?;
-    file.read_exact(&mut magic)?;
-    let (big_endian, is_big) = (magic[0] == b'M', magic.contains(&43));
-    let (offset, count) = if is_big { (8, 8) } else { (4, 2) };
-    file.seek(SeekFrom::Start(directory))?;
     let mut found = Vec::new();
-    for _ in 0..number(file, count, big_endian)? {
-        let tag = number(file, 2, big_endian)?;
-        let kind = number(file, 2, big_endian)?;
-        let length = number(file, offset, big_endian)?;
-        let at = file.stream_position()?;
-        let value_or_offset = number(file, offset, big_endian)?;
+    visit(file, directory, |Entry { tag, kind, values, at, value_or_offset, room, .. }| -> Option<()> {
         if tag == u64::from(DESCRIPTION) && BYTES.contains(&kind) && found.len() < MAX_DESCRIPTIONS {
-            found.push((if length > offset as u64 { value_or_offset } else { at }, length));
+            found.push((if values > room { value_or_offset } else { at }, values));
         }
-    }
+        None
+    })?;
     Ok(found)
 }
 

@@ -10,7 +10,7 @@ use super::super::series::MAX_CHANNELS;
 use super::pages::Page;
 use super::stack::{Axis, Stack};
 
-/// What the description states: `{"shape": [2, 5, 16, 20], "axes": "CZYX"}`.
+/// The description's statement: `{"shape": [2, 5, 16, 20], "axes": "CZYX"}`.
 #[derive(Debug, PartialEq)]
 pub(super) struct Shaped {
     /// The lengths of the axes, the slowest one first; the last ones are those of a page.
@@ -42,7 +42,7 @@ impl Shaped {
         Some(Self { shape, axes, is_truncated })
     }
 
-    /// What the pages show. `None` if the shape is that of one page, as where pages were written one by one, or of other pages.
+    /// The order of the pages. `None` if the shape is that of one page, as where pages were written one by one, or of other pages.
     pub(super) fn stack(&self, path: &Path, page: Page) -> Result<Option<Stack>, VolumeError> {
         let [width, height, samples] = [page.size[0], page.size[1], page.samples].map(u64::from);
         let of_page = [&[height, width, samples][..], &[samples, height, width], &[height, width]];
@@ -101,7 +101,7 @@ impl Shaped {
     }
 }
 
-/// What axes before those of a page are by their letters; `None` if they do not tell. One axis that is none of time, channel and z is z.
+/// The meaning of the axes before those of a page, by their letters; `None` if they do not tell. One axis that is none of time, channel and z is z.
 fn axes_of(letters: &[Option<char>]) -> Option<Vec<Axis>> {
     let axes: Vec<Option<Axis>> = letters
         .iter()

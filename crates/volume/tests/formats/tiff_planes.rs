@@ -1,4 +1,4 @@
-//! What the pages of a TIFF file are, by the descriptions of tifffile, Micro-Manager, MetaMorph and OME. The right values are those that tifffile reads.
+//! The pages of a TIFF file, by the descriptions of tifffile, Micro-Manager, MetaMorph and OME. The right values are those that tifffile reads.
 
 use sheetsplat_volume::{Encoding, ReadOptions, SampleType};
 

@@ -65,7 +65,7 @@ struct Info {
     colors: bool,
     /// Of the file.
     times: u32,
-    /// What tells the times apart, where it is more than their numbers.
+    /// The marks that tell the times apart, where they are more than their numbers.
     time_names: Vec<String>,
     /// The series of the folder; empty if there is only one.
     series: Vec<String>,

@@ -26,7 +26,7 @@ fn expected(count: usize, more: f32) -> Vec<f32> {
     (0..6 * count).map(|i| (20 * (i / 6) + i % 6) as f32 + more).collect()
 }
 
-/// As GDCM's `GetSeriesIDs` lists them; a page without a place, a scout in the same series, and another series.
+/// Series are those that GDCM's `GetSeriesIDs` lists; a page without a place, a scout in the same series, and another series.
 #[test]
 fn the_largest_series_is_read() {
     let mut slices = at(&[0.0, 2.0, 4.0]);
@@ -198,7 +198,7 @@ fn classic_frames() {
     assert_eq!(volume.values().at(0), 6.0);
 }
 
-/// As `pydicom.pixels.apply_modality_lut` gives them; and values in different units.
+/// Values are those that `pydicom.pixels.apply_modality_lut` gives; and values in different units.
 #[test]
 fn values_are_in_the_files_unit() {
     let volume = Volume::open(&fixture("dicom/table.dcm")).unwrap();
