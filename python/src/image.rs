@@ -77,6 +77,8 @@ pub(crate) fn write(py: Python<'_>, path: PathBuf, bytes: Vec<u8>, inputs: Vec<P
 pub(crate) fn output(path: &Path, bytes: &[u8]) -> Result<(), Raised> {
     let written = Target::of(path).and_then(Target::create).and_then(|mut output| {
         output.write_all(bytes)?;
+        // Before Ctrl-C has to wait: a slow disk takes seconds.
+        output.sync()?;
         if may_commit() { Output::commit(vec![output]).map_err(|(_, error)| error) } else { Ok(()) }
     });
     written.map_err(|source| error::file(path, &source))

@@ -147,8 +147,11 @@ impl Output {
         self.file.set_permissions(replaced.permissions())
     }
 
-    /// Waits until the bytes are on the disk, so that no crash leaves the file's name without them.
-    fn sync(&self) -> io::Result<()> {
+    /// Waits until the bytes are on the disk, so that no crash leaves the file's name without them. [`Self::commit`] does it, too.
+    ///
+    /// # Errors
+    /// The operating system's error.
+    pub fn sync(&self) -> io::Result<()> {
         match self.file.sync_all() {
             // Some file systems have nothing to wait for.
             Err(error) if matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => Ok(()),
