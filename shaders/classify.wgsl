@@ -120,10 +120,10 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             let ray = sheet_depths(at, depths);
             let slope = slope_of(px);
             let per_depth = sqrt(1.0 + dot(slope, slope)) / abs(dot(cut.sheet_along.xyz, at));
-            let none = vec4f(0.0);
-            let place = Slab(at, near, far, sheet_group.near, ray, per_depth, none, none, none, none, none);
+            let place = place_between(px, at, near, sheet_group.near, ray, per_depth);
             var composited = Composited(image, vec4u(), vec4f(), FAR, false);
-            var sheets_of_channels = ChannelSum();
+            var near_sheets = ChannelSum();
+            var far_sheets = ChannelSum();
             for (var channel = 0u; channel < CHANNELS; channel += 1u) {
                 see_channel(channel);
                 let drawn = plane_sample(pixel, at);
@@ -151,14 +151,16 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                         now = composited.carried;
                         color_now = composited.carried_color;
                     } else {
-                        sheets_of_channels = with_channel(sheets_of_channels, sheet_of(slab, light));
+                        let own = sheets_of(slab, light);
+                        near_sheets = with_channel(near_sheets, own.near);
+                        far_sheets = with_channel(far_sheets, own.far);
                     }
                 }
                 carry(slot, pixels, with_sample(now, drawn));
                 carry_color(slot, pixels, color_now);
             }
             if !is_by_means() {
-                composited = composite_sheet(total(sheets_of_channels), part_of(ray, near, far), image);
+                composited = composite_sheets(SlabSheets(total(near_sheets), total(far_sheets)), ray, near, image);
             }
             if composited.is_changed {
                 acc[slot] = composited.image;

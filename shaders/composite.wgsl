@@ -88,7 +88,7 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
                 let near = sheet_group.near + f32(layer) * frame.slab_width;
                 let part = vec2f(max(ray.x, near), min(ray.y, near + frame.slab_width));
                 if CUT && COMPOSITING != MINIMUM {
-                    sheet *= shown_share(ray, near);
+                    sheet *= shown_share(ray, near, frame.slab_width);
                 }
                 if is_by_means() {
                     sheet *= looks.weight;

@@ -103,10 +103,10 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
         last = min(last, shown_to);
         if COMPOSITING != MINIMUM {
             scale = vec4f(
-                shown_share(vec2f(shown_from.x, shown_to.x), near),
-                shown_share(vec2f(shown_from.y, shown_to.y), near),
-                shown_share(vec2f(shown_from.z, shown_to.z), near),
-                shown_share(vec2f(shown_from.w, shown_to.w), near),
+                shown_share(vec2f(shown_from.x, shown_to.x), near, frame.slab_width),
+                shown_share(vec2f(shown_from.y, shown_to.y), near, frame.slab_width),
+                shown_share(vec2f(shown_from.z, shown_to.z), near, frame.slab_width),
+                shown_share(vec2f(shown_from.w, shown_to.w), near, frame.slab_width),
             );
         }
     }

@@ -239,8 +239,11 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
             now = Composited(found.image, now.carried, now.carried_color, found.hit, found.is_changed);
         } else {
             let is_own = CHANNELS == 1u || ((shown >> at) & 1u) != 0u;
-            let sheet = select(vec4f(0.0), sheet_of(slab, light), is_own);
-            let added = composite_layer(sheet, part, now.image, pixels, at);
+            var own = SlabSheets();
+            for (var is_seen = is_own; is_seen; is_seen = false) {
+                own = sheets_of(slab, light);
+            }
+            let added = composite_layer(own, slab, now.image, pixels, at);
             now = Composited(added.image, now.carried, now.carried_color, added.hit, added.is_changed);
         }
         result = with_color(result, i, now.image);
@@ -304,10 +307,8 @@ fn color_before_slab(points: Points, at: u32) -> vec4f {
 
 // The ray of a thread's `i`-th pixel in a slab.
 fn place_in_slab(pixels: Pixels, i: u32, near: f32, far: f32) -> Slab {
-    let at = place_of(vec2f(pixels.column, pixels.rows[i]));
-    let none = vec4f(0.0);
-    let ray = vec2f(shown_from[i], shown_to[i]);
-    return Slab(at, near, far, far, ray, length_per_depth[i], none, none, none, none, none);
+    let px = vec2f(pixels.column, pixels.rows[i]);
+    return place_between(px, place_of(px), near, far, vec2f(shown_from[i], shown_to[i]), length_per_depth[i]);
 }
 
 // Whether a slab may change a pixel of some colour.
@@ -340,49 +341,65 @@ fn slabs_of_layers(thread: u32) -> u32 {
     return (sheets_of_layers[round / 2u] >> (16u * (round % 2u))) & 0xffffu;
 }
 
-// The sheets of a group's first slab at all of a patch's pixels, added up over layers. Those of the other slabs are behind the records that pixels carry:
-// here they would take the queue's room, and all four there would make the second channel's memory more than the first one's.
+// The nearer sheets of a group's first slab at all of a patch's pixels, added up over layers. All others are behind the records that pixels carry:
+// here they would take the queue's room, and all of a group there would make the second channel's memory more than the first one's.
 override LAYER_SHEETS: u32 = 1u;
 var<workgroup> layer_sheets: array<vec4f, LAYER_SHEETS>;
 
-// The record of the sheet of a slab behind the first.
-fn sheet_record(pixels: Pixels, slab: u32) -> u32 {
-    return arrayLength(&carried) - (SHEETS - max(slab / 4u, 1u)) * carried_pixels() + carried_slot(pixels, slab % 4u);
+// The record of a sheet, counted from the last one.
+fn sheet_record(pixels: Pixels, slab: u32, number: u32) -> u32 {
+    return arrayLength(&carried) - number * carried_pixels() + carried_slot(pixels, slab % 4u);
 }
 
-fn layer_sheet(pixels: Pixels, slab: u32) -> vec4f {
+fn near_sheet_record(pixels: Pixels, slab: u32) -> u32 {
+    return sheet_record(pixels, slab, SHEETS - max(slab / 4u, 1u));
+}
+
+fn far_sheet_record(pixels: Pixels, slab: u32) -> u32 {
+    return sheet_record(pixels, slab, 2u * SHEETS - 1u - slab / 4u);
+}
+
+fn layer_sheets_of(pixels: Pixels, slab: u32) -> SlabSheets {
     let first = layer_sheets[(slab % 4u) * PATCH_THREADS + pixels.thread];
-    return select(bitcast<vec4f>(carried[sheet_record(pixels, slab)]), first, slab < 4u);
+    var sheets = SlabSheets(select(bitcast<vec4f>(carried[near_sheet_record(pixels, slab)]), first, slab < 4u), vec4f(0.0));
+    for (var is_read = SEGMENTS > 1u; is_read; is_read = false) {
+        sheets.far = bitcast<vec4f>(carried[far_sheet_record(pixels, slab)]);
+    }
+    return sheets;
 }
 
-fn keep_layer_sheet(pixels: Pixels, slab: u32, sheet: vec4f) {
+fn keep_layer_sheets(pixels: Pixels, slab: u32, sheets: SlabSheets) {
     if slab < 4u {
-        layer_sheets[slab * PATCH_THREADS + pixels.thread] = sheet;
+        layer_sheets[slab * PATCH_THREADS + pixels.thread] = sheets.near;
     } else {
-        carried[sheet_record(pixels, slab)] = bitcast<vec4u>(sheet);
+        carried[near_sheet_record(pixels, slab)] = bitcast<vec4u>(sheets.near);
+    }
+    if SEGMENTS > 1u {
+        carried[far_sheet_record(pixels, slab)] = bitcast<vec4u>(sheets.far);
     }
 }
 
-// Adds a layer's sheet to those of the layers before it, and composites the sum of all. `slab` is the number of the slab and pixel among the
+// Adds a layer's sheets to those of the layers before it, and composites the sums of all. `number` is that of the slab and pixel among the
 // thread's.
-fn composite_layer(sheet: vec4f, part: vec2f, image: vec4f, pixels: Pixels, slab: u32) -> Composited {
-    var sum = sheet;
+fn composite_layer(own: SlabSheets, slab: Slab, image: vec4f, pixels: Pixels, number: u32) -> Composited {
+    var sum = own;
     if CHANNELS > 1u {
         let round = pixels.thread / THREADS;
-        let bit = select(vec4u(0u), vec4u(1u << (slab + 16u * (round % 2u))), vec4u(round / 2u) == PIXELS);
-        let is_added = sheet.a > 0.0;
+        let bit = select(vec4u(0u), vec4u(1u << (number + 16u * (round % 2u))), vec4u(round / 2u) == PIXELS);
+        let is_added = max(own.near.a, own.far.a) > 0.0;
         let is_after_others = any((sheets_of_layers & bit) != vec4u(0u));
         for (var is_read = is_after_others && (is_added || is_last_layer()); is_read; is_read = false) {
-            sum += layer_sheet(pixels, slab);
+            let before = layer_sheets_of(pixels, number);
+            sum = SlabSheets(sum.near + before.near, sum.far + before.far);
         }
         for (var is_kept = is_added && !is_last_layer(); is_kept; is_kept = false) {
-            keep_layer_sheet(pixels, slab, sum);
+            keep_layer_sheets(pixels, number, sum);
         }
         sheets_of_layers |= select(vec4u(0u), bit, is_added);
     }
     var composited = Composited(image, vec4u(), vec4f(), FAR, false);
-    for (var is_due = is_last_layer() && sum.a > 0.0; is_due; is_due = false) {
-        composited = composite_sheet(sum, part, image);
+    for (var is_due = is_last_layer() && max(sum.near.a, sum.far.a) > 0.0; is_due; is_due = false) {
+        composited = composite_sheets(sum, slab.ray, slab.near, image);
     }
     return composited;
 }

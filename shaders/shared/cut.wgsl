@@ -62,11 +62,10 @@ fn is_drawn_slab(middle: f32) -> bool {
     return (cut.slabs.x < middle) & (middle < cut.slabs.y);
 }
 
-// The share of the slab between two sheet depths that a ray from `ray.x` to `ray.y` shows. From what is missing, so that whole slabs are not
-// rounded.
-fn shown_share(ray: vec2f, near: f32) -> f32 {
-    let missing = max(ray.x - near, 0.0) + max(near + frame.slab_width - ray.y, 0.0);
-    return max(1.0 - missing / frame.slab_width, 0.0);
+// The share of a stretch of sheet depths that a ray from `ray.x` to `ray.y` shows. From what is missing, so that whole stretches are not rounded.
+fn shown_share(ray: vec2f, near: f32, width: f32) -> f32 {
+    let missing = max(ray.x - near, 0.0) + max(near + width - ray.y, 0.0);
+    return max(1.0 - missing / width, 0.0);
 }
 
 // A range of depths on a ray, converted to sheet depths; an empty range stays reversed.

@@ -89,6 +89,11 @@ fn look(near: vec4f, far: vec4f, own: vec4f, table: Table, light: Lighting) -> L
     if means.amount <= 0.0 {
         return Look(0.0, vec3f(0.0));
     }
+    return look_at(means, near, far, own, table, light);
+}
+
+// The same, given the means.
+fn look_at(means: SlabIntegral, near: vec4f, far: vec4f, own: vec4f, table: Table, light: Lighting) -> Look {
     let gradient = gradient_between(near, far, means.share);
     let color = colored(means.color, own);
     return Look(means.amount * color.a * gradient_opacity(table, gradient), shade(color.rgb, gradient, light));

@@ -9,10 +9,14 @@
 // #import shared/first_surface
 // #import shared/frame
 // #import shared/planes
+// #import shared/project
 // #import shared/ramps
 // #import shared/seen
 // #import shared/shading
 // #import shared/slab_integral
+
+// The number of segments of a slab, along each of which numbers run linearly: 2 by the cubic profile.
+override SEGMENTS: u32 = 1u;
 
 // What pixels carry from plane to plane, as bits: for every channel a record of each pixel, then for every channel whose voxels have colours of their own.
 // A channel's record: the number on the previous plane, and there its gradient in numbers per `unit`. For `maximum` and `minimum` the gradient is packed
@@ -87,11 +91,14 @@ struct Slab {
     far: f32,
     plane: f32,
     ray: vec2f,
-    // The ray's length per sheet depth.
+    // The ray's length per sheet depth, and its way from plane to plane in `unit`s.
     per_depth: f32,
+    way: vec3f,
     // The samples at the planes; where only one has a value, it stands for both.
     first: vec4f,
     last: vec4f,
+    // The middle of the cubic through both, in numbers and slopes.
+    middle: vec4f,
     // The mean of the planes' colours.
     own: vec4f,
     // The sample and the colour at the plane that was drawn last.
@@ -108,6 +115,8 @@ fn slab_between(place: Slab, drawn: vec4f, before: vec4f, drawn_color: vec4f, co
     var slab = place;
     slab.first = select(own, other, draws_front_to_back());
     slab.last = select(other, own, draws_front_to_back());
+    let bend = dot(slab.first.yzw - slab.last.yzw, slab.way) / 8.0;
+    slab.middle = 0.5 * (slab.first + slab.last) + vec4f(bend, vec3f(0.0));
     slab.own = 0.5 * (own_color + other_color);
     slab.drawn = drawn;
     slab.drawn_color = drawn_color;
@@ -138,15 +147,74 @@ fn part_of(ray: vec2f, near: f32, far: f32) -> vec2f {
     return vec2f(max(ray.x, near), min(ray.y, far));
 }
 
-// `linear`, `exponential`, `xray`: a channel's sheet.
-fn sheet_of(slab: Slab, light: Lighting) -> vec4f {
-    let part = part_of(slab.ray, slab.near, slab.far);
-    let share = select(0.0, shown_share(slab.ray, slab.near), is_drawn(0.5 * (slab.near + slab.far)));
-    let seen = look(slab.first, slab.last, slab.own, table_at(slab.at, 0.5 * (part.x + part.y), 0.0), light);
-    return vec4f(seen.color, 1.0) * (seen.amount * share * frame.slab_width * slab.per_depth);
+// A ray in a slab whose planes' samples are not known yet.
+fn place_between(px: vec2f, at: vec3f, near: f32, drawn: f32, ray: vec2f, per_depth: f32) -> Slab {
+    let none = vec4f(0.0);
+    let way = normalize(warped_ray(px) * frame.aspect.xyz) * (per_depth * frame.slab_width);
+    return Slab(at, near, near + frame.slab_width, drawn, ray, per_depth, way, none, none, none, none, none, none);
 }
 
-// Composites the sum of the channels' sheets (SPEC §10).
+// A stretch of a slab along which samples run linearly.
+struct Segment {
+    near: f32,
+    width: f32,
+    first: vec4f,
+    last: vec4f,
+}
+
+// The `i`-th of as many segments of a slab: all of it, or the halves of its cubic profile.
+fn segment_of(slab: Slab, i: u32, segments: u32) -> Segment {
+    let width = frame.slab_width / f32(segments);
+    let first = select(slab.first, slab.middle, i == 1u);
+    let last = select(slab.last, slab.middle, i == 0u && segments == 2u);
+    return Segment(slab.near + f32(i) * width, width, first, last);
+}
+
+// The sheets of a slab's segments.
+struct SlabSheets {
+    near: vec4f,
+    far: vec4f,
+}
+
+// `linear`, `exponential`, `xray`: a channel's sheets.
+fn sheets_of(slab: Slab, light: Lighting) -> SlabSheets {
+    let part = part_of(slab.ray, slab.near, slab.far);
+    let table = table_at(slab.at, 0.5 * (part.x + part.y), 0.0);
+    var sheets = SlabSheets();
+    // First the whole slab, whose halves count only if it shows anything: one place for all, because much is compiled into it.
+    let is_seen = is_drawn(0.5 * (slab.near + slab.far));
+    for (var step = select(SEGMENTS + 1u, 2u - SEGMENTS, is_seen); step <= SEGMENTS; step += 1u) {
+        let is_whole = step == 0u;
+        let segment = segment_of(slab, max(step, 1u) - 1u, select(SEGMENTS, 1u, is_whole));
+        let means = slab_integral(table, segment.first.x, segment.last.x);
+        if means.amount <= 0.0 && is_whole {
+            break;
+        }
+        for (var is_shown = means.amount > 0.0 && !is_whole; is_shown; is_shown = false) {
+            let seen = look_at(means, segment.first, segment.last, slab.own, table, light);
+            let share = shown_share(slab.ray, segment.near, segment.width);
+            let sheet = vec4f(seen.color, 1.0) * (seen.amount * share * segment.width * slab.per_depth);
+            sheets.near = select(sheets.near, sheet, step == 1u);
+            sheets.far = select(sheets.far, sheet, step == 2u);
+        }
+    }
+    return sheets;
+}
+
+// Composites the sums of the channels' sheets in turn (SPEC §10).
+fn composite_sheets(sheets: SlabSheets, ray: vec2f, near: f32, image: vec4f) -> Composited {
+    var result = Composited(image, vec4u(), vec4f(), FAR, false);
+    for (var k = 0u; k < SEGMENTS; k += 1u) {
+        let i = select(SEGMENTS - 1u - k, k, draws_front_to_back());
+        let width = frame.slab_width / f32(SEGMENTS);
+        let begin = near + f32(i) * width;
+        let now = composite_sheet(select(sheets.near, sheets.far, i == 1u), part_of(ray, begin, begin + width), result.image);
+        let hit = select(result.hit, now.hit, now.hit != FAR);
+        result = Composited(now.image, vec4u(), vec4f(), hit, result.is_changed || now.is_changed);
+    }
+    return result;
+}
+
 fn composite_sheet(sheet: vec4f, part: vec2f, image: vec4f) -> Composited {
     let is_changed = sheet.a > 0.0;
     let order = select(BACK_TO_FRONT, FRONT_TO_BACK, draws_front_to_back());
@@ -158,28 +226,41 @@ fn composite_sheet(sheet: vec4f, part: vec2f, image: vec4f) -> Composited {
 
 // `surface`: the pixel is opaque where its ray first meets one.
 fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
-    let start = max(slab.ray.x - slab.near, 0.0) / frame.slab_width;
-    let shown_end = 1.0 - max(slab.far - slab.ray.y, 0.0) / frame.slab_width;
-    let end = select(start, shown_end, is_drawn(0.5 * (slab.near + slab.far)));
-    let alpha = colored(vec3f(0.0), slab.own).a;
-    var share = NO_SURFACE;
+    let result = Composited(image, vec4u(), vec4f(), FAR, false);
+    let part = part_of(slab.ray, slab.near, slab.far);
     // Of two surfaces the nearer one counts.
-    if start < end && (!draws_front_to_back() || image.a < 1.0) {
-        if LABELS {
-            let first = voxel_at(slab.at, slab.near);
-            share = surface_in_cells(slab.first, slab.last, alpha, start, end, first, voxel_at(slab.at, slab.far));
-        } else {
-            share = surface_between(slab.first, slab.last, alpha, start, end, seen_table);
+    if part.x >= part.y || !is_drawn(0.5 * (slab.near + slab.far)) || (draws_front_to_back() && image.a >= 1.0) {
+        return result;
+    }
+    let alpha = colored(vec3f(0.0), slab.own).a;
+    var segments = SEGMENTS;
+    if SEGMENTS > 1u {
+        let table = table_at(slab.at, 0.5 * (part.x + part.y), 0.0);
+        segments = select(1u, SEGMENTS, slab_integral(table, slab.first.x, slab.last.x).amount > 0.0);
+    }
+    for (var i = 0u; i < segments; i += 1u) {
+        let segment = segment_of(slab, i, segments);
+        let far = segment.near + segment.width;
+        let start = max(slab.ray.x - segment.near, 0.0) / segment.width;
+        let end = 1.0 - max(far - slab.ray.y, 0.0) / segment.width;
+        var share = NO_SURFACE;
+        if start < end {
+            if LABELS {
+                let first = voxel_at(slab.at, segment.near);
+                share = surface_in_cells(segment.first, segment.last, alpha, start, end, first, voxel_at(slab.at, far));
+            } else {
+                share = surface_between(segment.first, segment.last, alpha, start, end, seen_table);
+            }
+        }
+        if share != NO_SURFACE {
+            let sheet_depth = segment.near + share * segment.width;
+            let table = table_at(slab.at, sheet_depth, 0.0);
+            let gradient = gradient_between(segment.first, segment.last, share);
+            let color = colored(color_at(table, mix(segment.first.x, segment.last.x, share)), slab.own);
+            return Composited(vec4f(shade(color.rgb, gradient, light), 1.0), vec4u(), vec4f(), sheet_depth, true);
         }
     }
-    if share == NO_SURFACE {
-        return Composited(image, vec4u(), vec4f(), FAR, false);
-    }
-    let sheet_depth = slab.near + share * frame.slab_width;
-    let table = table_at(slab.at, sheet_depth, 0.0);
-    let gradient = gradient_between(slab.first, slab.last, share);
-    let color = colored(color_at(table, mix(slab.first.x, slab.last.x, share)), slab.own);
-    return Composited(vec4f(shade(color.rgb, gradient, light), 1.0), vec4u(), vec4f(), sheet_depth, true);
+    return result;
 }
 
 // `maximum`, `minimum`, `average`: chooses among the planes' points, or means them. While there is no such point, the pixel has the colour of the

@@ -40,7 +40,7 @@ fn cells_of(table: Table) -> u32 {
 
 // The cell that a number lies in.
 fn cell_of(table: Table, x: f32) -> u32 {
-    let bin = u32(clamp((x - table.domain.x) * table.domain.y, 0.0, table.head.y - 1.0));
+    let bin = u32(clamp((x - table.domain.w) * table.domain.y, 0.0, table.head.y - 1.0));
     let ends = vec2u(control_points[table.ramps.w + 2u + bin].xy);
     let cells = cells_of(table);
     var first = ends.x;

@@ -12,7 +12,7 @@
 //!
 //! | entries | hold |
 //! |---|---|
-//! | `HEAD` | (cells, bins, the minimum and maximum number with an opacity, for `surface` of one half); (the minimum number, bins per number, the maximum number, 0) |
+//! | `HEAD` | (cells, bins, the minimum and maximum number with an opacity, for `surface` of one half); (the minimum number, bins per number, the maximum number, where bins begin) |
 //! | bins | (first cell, last cell, 0, 0) that a number in this bin may lie in |
 //! | cells · `CELL` | (minimum number, 1/width, α, α's rise over the cell); (C, maximum number); (C's rise, 0) |
 //! | levels · cells · `SUM` | (∫m, ∫m·(x - middle), middle, 0); (∫m·C, 0) between the cell and the middle of its block |
@@ -22,7 +22,7 @@
 use glam::{DVec3, Vec3, Vec4};
 
 use super::normalization::Normalization;
-use crate::settings::splatting::Compositing;
+use crate::settings::splatting::{Compositing, Splatting};
 use crate::settings::transfer_function::{Ramp, Tables};
 
 /// The number of entries before the bins.
@@ -57,12 +57,27 @@ struct Sums {
     color: DVec3,
 }
 
+/// How far beyond all values the middles of cubic slabs may lie, in lengths of the values' range: more than `|∇f0 - ∇f1|·D/8` with the steepest kernel, the widest
+/// slabs and the most oblique rays.
+const MOST_BEYOND: f64 = 1024.0;
+
+/// The range of numbers that a table covers: that of all values, and for cubic slabs what their middles may be.
+fn covered(splatting: &Splatting, numbers: &Normalization) -> [f64; 2] {
+    let [least, greatest] = numbers.range.map(f64::from);
+    let beyond = if splatting.segments() > 1 { MOST_BEYOND * (greatest - least) } else { 0.0 };
+    [least - beyond, greatest + beyond].map(|x| f64::from(x as f32))
+}
+
 /// The table for a transfer function's tables, to be read by [`SlabIntegral::new`].
-pub fn table(tables: &Tables, compositing: Compositing, numbers: &Normalization) -> Vec<[f32; 4]> {
-    let cells = cells(tables, compositing, numbers);
+pub fn table(tables: &Tables, splatting: &Splatting, numbers: &Normalization) -> Vec<[f32; 4]> {
+    let compositing = splatting.compositing;
+    let cells = cells(tables, compositing, covered(splatting, numbers), numbers);
     let [first, end] = [cells[0].ends[0], cells[cells.len() - 1].ends[1]];
     let bins = (4 * cells.len()).next_power_of_two().clamp(16, 1024);
-    let per_number = bins as f64 / (end - first);
+    // Bins divide the values' range; the first and the last one hold all that lies beyond.
+    let [least, greatest] = numbers.range.map(f64::from);
+    let [least, greatest] = if greatest > least { [least, greatest] } else { [first, end] };
+    let per_number = bins as f64 / (greatest - least);
     // A surface is where the opacity is one half.
     let is_shown = |alpha: f64| if compositing == Compositing::Surface { alpha >= 0.5 } else { alpha > 0.0 };
     let shown = cells.iter().filter(|cell| is_shown(cell.alpha[0].max(cell.alpha[1])));
@@ -78,13 +93,14 @@ pub fn table(tables: &Tables, compositing: Compositing, numbers: &Normalization)
     let entry = |numbers: [f64; 4]| numbers.map(|number| number as f32);
     let with = |color: DVec3, last: f64| entry([color.x, color.y, color.z, last]);
     let mut points =
-        vec![entry([cells.len() as f64, bins as f64, shown[0], shown[1]]), entry([first, per_number, end, 0.0])];
+        vec![entry([cells.len() as f64, bins as f64, shown[0], shown[1]]), entry([first, per_number, end, least])];
     let cell_of = |x: f64| cells.partition_point(|cell| cell.ends[1] <= x).min(cells.len() - 1) as f64;
     // Rounding may put a number into the bin beside its own.
     let slack = 0.01 / per_number;
     points.extend((0..bins).map(|bin| {
-        let [low, high] = [0, 1].map(|end| first + (bin + end) as f64 / per_number);
-        entry([cell_of(low - slack), cell_of(high + slack), 0.0, 0.0])
+        let [low, high] = [0, 1].map(|end| least + (bin + end) as f64 / per_number);
+        let first_cell = if bin == 0 { 0.0 } else { cell_of(low - slack) };
+        entry([first_cell, if bin + 1 == bins { cell_of(end) } else { cell_of(high + slack) }, 0.0, 0.0])
     }));
     points.extend(cells.iter().flat_map(|cell| {
         let ([low, high], [alpha, last_alpha], [color, last_color]) = (cell.ends, cell.alpha, cell.color);
@@ -106,8 +122,7 @@ fn levels(cells: usize) -> u32 {
 }
 
 /// The cells in ascending order.
-fn cells(tables: &Tables, compositing: Compositing, numbers: &Normalization) -> Vec<Cell> {
-    let [least, greatest] = numbers.range.map(f64::from);
+fn cells(tables: &Tables, compositing: Compositing, [least, greatest]: [f64; 2], numbers: &Normalization) -> Vec<Cell> {
     let value = |x: f64| numbers.base + x / numbers.scale;
     let positions = |value: f64| numbers.apply(value);
     // A surface stands where an iso-range is a single value, too: that is the least range of `f32`s around it.
@@ -238,7 +253,7 @@ impl SlabIntegral {
     /// The means over the numbers from f0 to f1 by a [`table`]; `None` if none of them has an opacity.
     pub fn new(points: &[[f32; 4]], compositing: Compositing, [f0, f1]: [f32; 2]) -> Option<Self> {
         let [cell_count, bins, shown_from, shown_to] = points[0];
-        let [least, per_number, greatest, _] = points[1];
+        let [least, per_number, greatest, origin] = points[1];
         let [x0, x1] = [f0, f1].map(|f| f.clamp(least, greatest));
         let (low, high) = (x0.min(x1), x0.max(x1));
         if high < shown_from || low > shown_to {
@@ -247,7 +262,7 @@ impl SlabIntegral {
         let first_cell = HEAD + bins as usize;
         let cell_at = |cell: usize| &points[first_cell + CELL * cell..first_cell + CELL * (cell + 1)];
         let cell_of = |x: f32| {
-            let bin = ((x - least) * per_number).clamp(0.0, bins - 1.0) as usize;
+            let bin = ((x - origin) * per_number).clamp(0.0, bins - 1.0) as usize;
             let [mut first, mut last, ..] = points[HEAD + bin].map(|cell| cell as usize);
             while first < last {
                 let middle = (first + last).div_ceil(2);

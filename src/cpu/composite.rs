@@ -24,8 +24,31 @@ pub(super) struct Compositor {
     pub(super) first_hit: Option<f32>,
 }
 
+/// The stretch of rays that a sheet stands for, in slabs as [`TileRays`] counts them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    /// The beginning of its slab.
+    pub(super) slab: f32,
+    pub(super) begin: f32,
+    pub(super) end: f32,
+}
+
+impl Stretch {
+    /// A slab, given its beginning.
+    pub(super) fn slab(slab: f32) -> Self {
+        Self { slab, begin: slab, end: slab + 1.0 }
+    }
+
+    /// One of as many segments of a slab.
+    pub(super) fn segment(slab: f32, number: usize, segments: usize) -> Self {
+        let length = 1.0 / segments as f32;
+        let begin = slab + length * number as f32;
+        Self { slab, begin, end: begin + length }
+    }
+}
+
 impl Compositor {
-    /// Composites a sheet that begins at `begin`, empties it, and finds the pixels that became opaque; the number of tiles
+    /// Composites the sheet of a stretch of rays, empties it, and finds the pixels that became opaque; the number of tiles
     /// as statistics count them (SPEC §8) in which there was anything to composite.
     #[inline(always)]
     pub(super) fn composite<S: Simd>(
@@ -33,7 +56,7 @@ impl Compositor {
         simd: S,
         sheet: &mut impl Sheet,
         buffers: &mut Buffers,
-        (rays, begin): (&TileRays, f32),
+        (rays, stretch): (&TileRays, Stretch),
         open: &mut OpenMask,
     ) -> u64 {
         let filled = sheet.rows();
@@ -56,7 +79,7 @@ impl Compositor {
                     None if has_empty => [f32x8::splat(simd, 0.0); CHANNELS],
                     None => continue,
                 };
-                opaque |= self.vector(simd, pixels, buffers, (rays, begin), [row, vector * LANES]);
+                opaque |= self.vector(simd, pixels, buffers, (rays, stretch), [row, vector * LANES]);
             }
             open.find(row, opaque);
         }
@@ -70,18 +93,18 @@ impl Compositor {
         simd: S,
         mut pixels: Pixels<S>,
         buffers: &mut Buffers,
-        (rays, begin): (&TileRays, f32),
+        (rays, stretch): (&TileRays, Stretch),
         [row, at]: [usize; 2],
     ) -> u32 {
         let splat = |number: f32| f32x8::splat(simd, number);
         let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[at..at + LANES]);
-        let mut stretch = [splat(f32::NEG_INFINITY), splat(f32::INFINITY)];
+        let mut shown = [splat(f32::NEG_INFINITY), splat(f32::INFINITY)];
         let mut closed = 0;
-        if let Some(shown) = &rays.shown {
-            stretch = [load(&shown[row][0]), load(&shown[row][1])];
-            closed = stretch[1].simd_le(splat(begin + 1.0)).to_bitmask() as u32;
+        if let Some(rows) = &rays.shown {
+            shown = [load(&rows[row][0]), load(&rows[row][1])];
+            closed = shown[1].simd_le(splat(stretch.slab + 1.0)).to_bitmask() as u32;
             if self.compositing != Compositing::Minimum {
-                let [start, end] = within_slab(simd, stretch, begin);
+                let [start, end] = within(simd, shown, stretch);
                 pixels = scaled(pixels, (end - start).max(splat(0.0)));
             }
         }
@@ -92,7 +115,7 @@ impl Compositor {
         let before = acc.each_ref().map(load);
         let mut after = self.pixels(simd, before, pixels);
         if let Some(counted) = &rays.counted {
-            let middle = splat(begin + 0.5);
+            let middle = splat(stretch.slab + 0.5);
             let counts = load(&counted[row][0]).simd_le(middle) & middle.simd_le(load(&counted[row][1]));
             after = std::array::from_fn(|channel| counts.select(after[channel], before[channel]));
         }
@@ -102,7 +125,7 @@ impl Compositor {
         if self.first_hit.is_some() {
             let hits = &mut buffers.hits[row];
             let opacities = [before[3], pixels[3], after[3]];
-            let hit = self.hit(simd, load(hits), opacities, stretch, begin);
+            let hit = self.hit(simd, load(hits), opacities, shown, stretch);
             hit.store_slice(&mut hits[at..at + LANES]);
         }
         self.threshold.map_or(0, |threshold| (after[3].simd_ge(splat(threshold)).to_bitmask() as u32 | closed) << at)
@@ -159,17 +182,17 @@ impl Compositor {
         simd: S,
         hit: f32x8<S>,
         [before, sheet, after]: [f32x8<S>; 3],
-        stretch: [f32x8<S>; 2],
-        begin: f32,
+        shown: [f32x8<S>; 2],
+        stretch: Stretch,
     ) -> f32x8<S> {
         let is_surface = self.compositing == Compositing::Surface;
         let opacity = f32x8::splat(simd, if is_surface { 1.0 } else { self.first_hit.unwrap_or(1.0) });
         let is_here = before.simd_lt(opacity) & after.simd_ge(opacity);
         let at = if is_surface {
             // Counted from the middle of the previous slab.
-            (crossing(before, sheet) + (begin - 0.5)).max(stretch[0]).min(stretch[1])
+            (crossing(before, sheet) + (stretch.slab - 0.5)).max(shown[0]).min(shown[1])
         } else {
-            let [start, end] = within_slab(simd, stretch, begin);
+            let [start, end] = within(simd, shown, stretch);
             start + (end - start) * ((opacity - before) / (after - before))
         };
         is_here.select(at, hit)
@@ -177,15 +200,15 @@ impl Compositor {
 }
 
 /// The number of tiles of [`TILE`] rows that hold any of some rows.
-fn tiles_of(rows: u64) -> u64 {
+pub(super) fn tiles_of(rows: u64) -> u64 {
     let of_tile = u64::MAX >> (u64::BITS - TILE);
     (0..ROWS as u32).step_by(TILE as usize).map(|first| u64::from(rows >> first & of_tile != 0)).sum()
 }
 
-/// The length of the part of a stretch that lies in the slab beginning at `begin`.
+/// The part of what rays show that lies in a stretch.
 #[inline(always)]
-fn within_slab<S: Simd>(simd: S, [start, end]: [f32x8<S>; 2], begin: f32) -> [f32x8<S>; 2] {
-    [start.max(f32x8::splat(simd, begin)), end.min(f32x8::splat(simd, begin + 1.0))]
+fn within<S: Simd>(simd: S, [start, end]: [f32x8<S>; 2], Stretch { begin, end: last, .. }: Stretch) -> [f32x8<S>; 2] {
+    [start.max(f32x8::splat(simd, begin)), end.min(f32x8::splat(simd, last))]
 }
 
 /// Where between the middles of a slab and of the next one their means' opacity is one half, if it grows evenly.

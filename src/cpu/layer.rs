@@ -78,7 +78,7 @@ impl Layer {
                 let sharing = coefficients.len();
                 for (of, coefficients) in channels(volume, transfer).zip(&mut *coefficients) {
                     coefficients.prepare(of.0, scene);
-                    coefficients.look(of, scene.splatting.compositing, &view, sharing);
+                    coefficients.look(of, &scene.splatting, &view, sharing);
                 }
                 let frames = channels(volume, transfer).zip(&*coefficients).enumerate();
                 let frame = |(number, ((volume, transfer), coefficients))| {

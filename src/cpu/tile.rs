@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use super::batch::Batch;
 use super::bin::Placed;
+use super::composite::Stretch;
 use super::count::{Tally, bits};
 use super::cull::{Boxes, OpenMask, Pixels};
 use super::cut::TileRays;
@@ -208,7 +209,13 @@ impl<'a> TileWalk<'a> {
                     return;
                 }
                 let begin = rays.begin(frame.projection.direction * sheet);
-                let tiles = frame.compositor.composite(simd, &mut ring.sheet(sheet), buffers, (rays, begin), open);
+                let tiles = frame.compositor.composite(
+                    simd,
+                    &mut ring.sheet(sheet),
+                    buffers,
+                    (rays, Stretch::slab(begin)),
+                    open,
+                );
                 open.close_found();
                 if frame.touched.contains(&sheet) {
                     tally.tiles_composited += tiles;

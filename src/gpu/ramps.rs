@@ -7,7 +7,7 @@ use glam::DVec4;
 use crate::after::normalization::Normalization;
 use crate::after::slab_integral;
 use crate::lists::iso_range::{ValueSet, of_ordinal, ordinal};
-use crate::settings::splatting::Compositing;
+use crate::settings::splatting::Splatting;
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 
 /// The control points of the channels that share sheets (SPEC §10).
@@ -58,12 +58,10 @@ impl Stored {
 /// What integrals of ramps are made for (SPEC §9).
 #[derive(Clone, Copy, Debug)]
 pub struct Integration<'a> {
-    /// How sheets are composited.
-    pub compositing: Compositing,
+    /// The kernel, slabs and compositing.
+    pub splatting: &'a Splatting,
     /// What the values of each channel are splatted as.
     pub numbers: &'a [Normalization],
-    /// The kernel's radius.
-    pub radius: f64,
 }
 
 impl Ramps {
@@ -90,8 +88,8 @@ impl Ramps {
             let mut append = |points: &mut Vec<[f32; 4]>, label| {
                 let tables = transfer.tables(label);
                 let bounds = append(points, &tables, is_alone);
-                if let Some(Integration { compositing, numbers, .. }) = integration {
-                    let table = slab_integral::table(&tables, compositing, &numbers[number]);
+                if let Some(Integration { splatting, numbers }) = integration {
+                    let table = slab_integral::table(&tables, splatting, &numbers[number]);
                     cells = cells.max(table[0][0] as u32);
                     points.extend(table);
                 }
@@ -117,12 +115,12 @@ impl Ramps {
         let mut colored = 0;
         for (number, (main, labelled)) in mains.iter().zip(labelled).enumerate() {
             points.extend([exact(*main), exact(labelled)]);
-            points.push(integration.map_or([0.0; 4], |Integration { numbers, radius, .. }| {
+            points.push(integration.map_or([0.0; 4], |Integration { splatting, numbers }| {
                 let has_colors = labelled[3] > 0;
                 colored += u32::from(has_colors);
                 let place = if has_colors { colored } else { 0 };
                 let numbers = &numbers[number];
-                [numbers.scale.recip() as f32, numbers.min_moment(radius), place as f32, 0.0]
+                [numbers.scale.recip() as f32, numbers.min_moment(splatting.radius), place as f32, 0.0]
             }));
         }
         let lengths = [0, 1, 2].map(|ramp| all.iter().map(|ends| ends[ramp + 1] - ends[ramp]).max().unwrap_or(0));

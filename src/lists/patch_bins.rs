@@ -48,7 +48,7 @@ const MAX_PASSES_OF_BRICK: u32 = 158;
 const MAX_PASSES_OF_BRICK_OF_VALUES: u32 = MAX_PASSES_OF_BRICK - 40;
 
 /// The number of passes that classify and composite four slabs of a block.
-const MAX_PASSES_OF_SLABS: u32 = 200;
+const MAX_PASSES_OF_SLABS: u32 = 400;
 
 /// The number of passes that add the sheets of these slabs to those of other layers.
 const MAX_PASSES_OF_SUMS: u32 = 64;

@@ -37,6 +37,8 @@ pub struct ClassifyMode {
     pub channels: u32,
     /// Whether voxels of any channel have colours of their own.
     pub own_colors: bool,
+    /// The number of segments of a slab.
+    pub segments: u32,
 }
 
 /// The stage's buffers.
@@ -109,7 +111,7 @@ impl Classify {
 }
 
 fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
-    let ClassifyMode { composite, gradient, labels, holes, page_bits, channels, own_colors } = mode;
+    let ClassifyMode { composite, gradient, labels, holes, page_bits, channels, own_colors, segments } = mode;
     let stage = ShaderStages::COMPUTE;
     let own = [
         ("control_points", storage::<[f32; 4]>(stage, true)),
@@ -128,6 +130,7 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
         ("PAGE_BITS", f64::from(page_bits)),
         ("CHANNELS", f64::from(channels)),
         ("OWN_COLORS", flag(own_colors)),
+        ("SEGMENTS", f64::from(segments)),
     ];
     let constants = [&composite.constants()[..], &own].concat();
     ComputeStage::new(device, shaders::CLASSIFY, "main", &slots, &constants)

@@ -70,6 +70,8 @@ pub struct PlaneMode {
     pub layers: u32,
     /// Whether voxels of any channel have colours of their own.
     pub own_colors: bool,
+    /// The number of segments of a slab.
+    pub segments: u32,
 }
 
 impl GatherMode {
@@ -286,6 +288,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
                 ("OWN_COLORS", flag(planes.own_colors)),
                 ("SUMS", f64::from(planes.sums())),
                 ("SAVED", f64::from(planes.sums() * SHEETS * PATCH_THREADS)),
+                ("SEGMENTS", f64::from(planes.segments)),
                 ("LAYER_SHEETS", f64::from(planes.layer_sheets())),
                 ("SHEETS_PER_TEST", f64::from(mode.sheets_per_test)),
                 ("QUEUE_COLORS", f64::from(if planes.own_colors { queue(device, mode) } else { 1 })),
@@ -420,7 +423,8 @@ mod tests {
 
     #[test]
     fn gpus_draw_sums_of_at_most_16_kib() {
-        let sums = |gradient, layers, own_colors| Some(PlaneMode { gradient, exact: true, layers, own_colors });
+        let sums =
+            |gradient, layers, own_colors| Some(PlaneMode { gradient, exact: true, layers, own_colors, segments: 2 });
         for kind in [DeviceType::DiscreteGpu, DeviceType::IntegratedGpu, DeviceType::VirtualGpu, DeviceType::Other] {
             let most = most_bytes_of(kind, 49152);
             for (mode, lanes, is_little) in [

@@ -223,6 +223,7 @@ impl FieldRasterizer {
             page_bits: page_bits(volume.pages()),
             channels: channels.len() as u32,
             own_colors: request.colored() > 0,
+            segments: request.splatting.segments(),
         };
         let bands = compositing.bands.iter().zip(carried);
         bands.map(|band| self.classify.bind(device, mode, buffers, band)).collect()

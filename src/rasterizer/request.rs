@@ -125,7 +125,7 @@ impl FrameRequest {
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let stored = volume.stored(layer);
         let is_after = splatting.classification == Classification::After;
-        let of_pixel = |stored: &[Stored]| records(stored) + sheet_records(stored);
+        let of_pixel = |stored: &[Stored]| records(stored) + sheet_records(stored, &splatting);
         let records = if is_after { of_pixel(&volume.gpu_volume().stored()) } else { 1 };
         let bands = CompositingBuffer::bands_for(&device.limits(), size, records)?;
         let is_cut = hiding.is_some() || !scene.clip.is_empty() || window.is_some();
@@ -139,11 +139,7 @@ impl FrameRequest {
         let surfaces = hiding.map(|hiding| hiding.depths(&seen, grid)).transpose()?;
         let (kind, fallback) = RasterizerKind::of(device, &splatting, stored.len(), rasterizer)?;
         let after = is_after.then(|| After::new((volume, layer), scene, &seen)).transpose()?;
-        let integration = after.as_ref().map(|after| Integration {
-            compositing: splatting.compositing,
-            numbers: &after.numbers,
-            radius: splatting.radius,
-        });
+        let integration = after.as_ref().map(|after| Integration { splatting: &splatting, numbers: &after.numbers });
         let first_channel = layer.channels.start;
         let alone = (first_channel > 0).then(|| volume.transfer().of_channel(first_channel));
         let transfer = alone.as_ref().unwrap_or_else(|| volume.transfer());
@@ -194,7 +190,7 @@ impl FrameRequest {
 
     /// The records of a pixel's sheets that tiles add up over channels.
     pub(crate) fn sheet_records(&self) -> u32 {
-        sheet_records(&self.stored)
+        sheet_records(&self.stored, &self.splatting)
     }
 
     /// The number of pixels in the image.
@@ -218,7 +214,7 @@ fn records(stored: &[Stored]) -> u32 {
     stored.len() as u32 + colored(stored)
 }
 
-/// The records of a pixel's sheets that tiles add up over channels, if there are several: one for each slab of a sheet group after the first.
-fn sheet_records(stored: &[Stored]) -> u32 {
-    if stored.len() > 1 { SHEETS - 1 } else { 0 }
+/// The records of a pixel's sheets that tiles add up over channels, if there are several: one for each segment of a slab of a sheet group but the first.
+fn sheet_records(stored: &[Stored], splatting: &Splatting) -> u32 {
+    if stored.len() > 1 { splatting.segments() * SHEETS - 1 } else { 0 }
 }

@@ -34,7 +34,8 @@ fn surface_passes(request: &FrameRequest, after: &After, by_label: bool) -> u32 
     let of_cells = cells * (4 + tested * of_test) + HALVINGS * of_test + 2 * (2 + of_search(cells.max(1)));
     // Where each voxel has its own table, the way through its cell is searched by itself.
     let borders = after.planes.slab_step(&request.view).to_array().map(|step| step as u32 + 2);
-    if by_label { borders.iter().sum::<u32>().saturating_mul(1 + of_cells) } else { of_cells }
+    let of_segment = if by_label { borders.iter().sum::<u32>().saturating_mul(1 + of_cells) } else { of_cells };
+    of_segment.saturating_mul(request.splatting.segments())
 }
 
 /// The passes through loops of a binary search among `points` control points.

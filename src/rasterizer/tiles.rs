@@ -414,6 +414,7 @@ fn plane_mode(request: &FrameRequest) -> Option<PlaneMode> {
         exact: needs.coefficients.is_some(),
         layers: layer_count(request),
         own_colors: request.colored() > 0,
+        segments: request.splatting.segments(),
     })
 }
 

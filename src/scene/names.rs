@@ -3,7 +3,7 @@
 use crate::settings::camera::Fit;
 use crate::settings::shading::Gradient;
 use crate::settings::splatting::{
-    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer,
+    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, SlabProfile,
 };
 
 pub(super) const FITS: &[(&str, Fit)] = &[("volume", Fit::Volume), ("object", Fit::Object)];
@@ -16,6 +16,7 @@ pub(crate) const CLASSIFICATIONS: &[(&str, Classification)] =
     &[("before", Classification::Before), ("after", Classification::After)];
 pub(super) const INTERPOLATIONS: &[(&str, Interpolation)] =
     &[("smooth", Interpolation::Smooth), ("exact", Interpolation::Exact), ("auto", Interpolation::Auto)];
+pub(super) const PROFILES: &[(&str, SlabProfile)] = &[("linear", SlabProfile::Linear), ("cubic", SlabProfile::Cubic)];
 pub(super) const GRADIENTS: &[(&str, Gradient)] =
     &[("differences", Gradient::Differences), ("kernel", Gradient::Kernel)];
 pub(super) const FORMS: &[(&str, FootprintForm)] =

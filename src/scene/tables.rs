@@ -7,7 +7,8 @@ use glam::DVec3;
 
 use super::color::{rgb, rgba};
 use super::names::{
-    BOXES, CLASSIFICATIONS, COMPOSITINGS, ENDIANS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS,
+    BOXES, CLASSIFICATIONS, COMPOSITINGS, ENDIANS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, PROFILES,
+    RASTERIZERS,
 };
 use super::overrides::MAX_CHANNELS;
 use super::reader::{Entry, LABEL, Section};
@@ -350,6 +351,7 @@ pub(super) fn splatting(mut section: Section, mut splatting: Splatting) -> Resul
     section.read("radius", &mut splatting.radius, |entry| entry.number(RADIUS))?;
     section.read("falloff", &mut splatting.falloff, |entry| entry.number(FALLOFF))?;
     section.read("slab_width", &mut splatting.slab_width, |entry| entry.number(SLAB_WIDTH))?;
+    section.read("slab_profile", &mut splatting.slab_profile, |entry| entry.choice(PROFILES))?;
     section.read("classification", &mut splatting.classification, |entry| entry.choice(CLASSIFICATIONS))?;
     section.read("interpolation", &mut splatting.interpolation, |entry| entry.choice(INTERPOLATIONS))?;
     section.read("footprint", &mut splatting.footprint, |entry| entry.choice(FORMS))?;

@@ -7,7 +7,8 @@ use glam::DVec3;
 use toml::Value;
 
 use super::names::{
-    BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, RASTERIZERS, name_of,
+    BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, PROFILES,
+    RASTERIZERS, name_of,
 };
 use super::{Channel, Fitting, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
@@ -250,13 +251,14 @@ fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
 fn write_splatting(text: &mut Text, splatting: &Splatting, fitting: Fitting) {
     let Splatting { method, radius, falloff, slab_width, footprint, compositing, order, .. } = *splatting;
     let Splatting { opacity_threshold, culling, tiles, rasterizer, footprint_box, experimental, .. } = *splatting;
-    let Splatting { classification, interpolation, .. } = *splatting;
+    let Splatting { classification, interpolation, slab_profile, .. } = *splatting;
     let Economies { whole_below, beta, resolution } = experimental;
     text.table("splatting");
     text.line("method", name_of(METHODS, method));
     text.line("radius", radius);
     text.line("falloff", falloff);
     text.line("slab_width", slab_width);
+    text.line("slab_profile", name_of(PROFILES, slab_profile));
     // A scene that does not state it leaves it to the volume.
     if classification != Classification::Auto {
         text.line("classification", name_of(CLASSIFICATIONS, classification));

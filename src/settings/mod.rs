@@ -24,7 +24,8 @@ pub use economies::Economies;
 pub use framing::{Extent, Sphere};
 pub use shading::{Gradient, Light, Shading};
 pub use splatting::{
-    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, Splatting,
+    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, SlabProfile,
+    Splatting,
 };
 pub use transfer_function::{LabelTables, Ramp, RampError, Tables, TransferFunction};
 pub use window::{Region, Window};

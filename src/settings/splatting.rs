@@ -74,6 +74,16 @@ pub enum Interpolation {
     Exact,
 }
 
+/// How values run between two slab planes for [`Classification::After`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum SlabProfile {
+    /// Linearly.
+    Linear,
+    /// Linearly to the middle of the cubic through the values and slopes at both planes, and on from there.
+    Cubic,
+}
+
 /// How kernel sections are stored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FootprintForm {
@@ -182,6 +192,8 @@ pub struct Splatting {
     pub interpolation: Interpolation,
     /// The slab width Δ in `unit`s of world length along a ray, 0.05 to 8.
     pub slab_width: f64,
+    /// How values run between slab planes; without effect for [`Classification::Before`], and where one value is chosen for a pixel.
+    pub slab_profile: SlabProfile,
     /// How kernel sections are stored.
     pub footprint: FootprintForm,
     /// How sheets are composited.
@@ -228,6 +240,11 @@ impl Splatting {
             return refused(found, "\"front-to-back\" with it");
         }
         if self.classification == Classification::After { self.check_after() } else { Ok(()) }
+    }
+
+    /// The number of segments of a slab after splatting, along each of which values run linearly.
+    pub fn segments(&self) -> u32 {
+        if self.slab_profile == SlabProfile::Cubic && !self.compositing.is_choice() { 2 } else { 1 }
     }
 
     /// Whether no other setting excludes [`Classification::After`].
@@ -322,6 +339,7 @@ impl Default for Splatting {
             classification: Classification::Before,
             interpolation: Interpolation::Smooth,
             slab_width: 1.0,
+            slab_profile: SlabProfile::Cubic,
             footprint: FootprintForm::SummedArea,
             compositing: Compositing::Linear,
             order: Order::FrontToBack,

@@ -8,7 +8,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::scene::{Channel, ImageSettings, Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::{
     Camera, Classification, Clip, Compositing, FootprintBox, Gradient, Interpolation, LabelTables, Light, Method,
-    Order, Projection, Ramp, Shading, Splatting,
+    Order, Projection, Ramp, Shading, SlabProfile, Splatting,
 };
 use sheetsplat::volume::{Grid, Labels, SampleType, Volume};
 
@@ -97,9 +97,12 @@ fn splatting(style: &mut Random, random: &mut Random) -> Splatting {
     let (rectangle, parallelogram) = (FootprintBox::Rectangle, FootprintBox::Parallelogram);
     let any = random.uniform(1.0, 4.0);
     let falloff = logarithmic(random, 0.02, 16.0);
+    // By a generator of its own, so that older cases stay.
+    let slab_profile = Random(random.0 ^ 0x2545_f491_4f6c_dd1d).pick(&[SlabProfile::Cubic, SlabProfile::Linear]);
     let mut splatting = Splatting {
         method,
         classification,
+        slab_profile,
         compositing,
         order,
         radius: random.pick(&[1.0, 2.0, 2.0, any, any, 4.0]),

@@ -28,6 +28,9 @@ pub(super) struct Slab<S: Simd> {
     pub(super) has_value: [u32; 2],
 }
 
+/// The labels of eight pixels.
+type Labels = [Option<u16>; LANES];
+
 /// The rays of a tile's pixels, as slabs are seen along them.
 pub(super) struct Looks<'a> {
     pub(super) origin: [usize; 2],
@@ -70,7 +73,7 @@ impl<'a> Looks<'a> {
 }
 
 impl Frame<'_> {
-    /// Classifies the slab between two planes, into the sheet. The length of rays is left out.
+    /// Classifies the slab between two planes, into the sheets of its segments. The length of rays is left out.
     #[inline(always)]
     // The state of one tile, of which each is changed by itself.
     #[expect(clippy::too_many_arguments, reason = "the parts of a tile's state")]
@@ -82,7 +85,7 @@ impl Frame<'_> {
         planes: &mut [Plane; 2],
         wanted: &[u32; ROWS],
         open: &mut OpenMask,
-        (sheet, buffers): (&mut SlabSheet, &mut Buffers),
+        (sheets, buffers): (&mut [SlabSheet], &mut Buffers),
     ) {
         for (row, bits) in wanted.iter().enumerate() {
             for column in (0..COLUMNS).step_by(LANES) {
@@ -96,8 +99,13 @@ impl Frame<'_> {
                 if self.compositing == Compositing::Surface {
                     let found = self.find_surfaces(simd, &slab, looks, planes, [column, row], buffers);
                     open.close(row, found << column);
-                } else if let Some(amounts) = self.amounts(simd, &slab, looks, planes, [column, row]) {
-                    sheet.add(simd, [column, row], amounts);
+                    continue;
+                }
+                let amounts = self.amounts(simd, &slab, looks, planes, [column, row]);
+                for (sheet, amounts) in sheets.iter_mut().zip(amounts) {
+                    if let Some(amounts) = amounts {
+                        sheet.add(simd, [column, row], amounts);
+                    }
                 }
             }
         }
@@ -242,23 +250,52 @@ impl Frame<'_> {
         ]
     }
 
-    /// The means of eight pixels in a slab, and the labels there.
+    /// The labels of eight pixels at the middles of their stretches in a slab; `None` if labels have no tables of their own.
     #[inline(always)]
-    pub(super) fn means<S: Simd>(
-        &self,
-        simd: S,
-        slab: &Slab<S>,
-        looks: &Looks<'_>,
-        [column, row]: [usize; 2],
-    ) -> (Means<S>, impl Fn(usize) -> Option<u16>) {
+    fn slab_labels(&self, slab: i32, lanes: u32, looks: &Looks<'_>, [column, row]: [usize; 2]) -> Option<Labels> {
+        let middles = self.labels.then(|| looks.middles(slab, [column, row]))?;
         let at = [looks.origin[0] + column, looks.origin[1] + row];
-        let middles = self.labels.then(|| looks.middles(slab.number, [column, row]));
-        let label = move |lane: usize| middles.and_then(|middles| self.label(at, lane, middles[lane]));
-        let table_of = self.labels.then_some(|lane| self.integrals.table(label(lane)));
-        (self.integrals.means(simd, slab.lanes, slab.values, table_of), label)
+        let mut labels = [None; LANES];
+        for lane in bits(lanes.into()).map(|lane| lane as usize) {
+            labels[lane] = self.label(at, lane, middles[lane]);
+        }
+        Some(labels)
     }
 
-    /// What a slab adds to eight pixels, by channel; `None` if none of them shows anything.
+    /// The means of some of eight pixels between two values, given the labels there.
+    #[inline(always)]
+    fn means_between<S: Simd>(&self, simd: S, lanes: u32, values: [f32x8<S>; 2], labels: &Option<Labels>) -> Means<S> {
+        let table_of = labels.as_ref().map(|labels| |lane: usize| self.integrals.table(labels[lane]));
+        self.integrals.means(simd, lanes, values, table_of)
+    }
+
+    /// Which of eight pixels show anything in a slab.
+    #[inline(always)]
+    pub(super) fn visible<S: Simd>(&self, simd: S, slab: &Slab<S>, looks: &Looks<'_>, at: [usize; 2]) -> u32 {
+        let labels = self.slab_labels(slab.number, slab.lanes, looks, at);
+        self.means_between(simd, slab.lanes, slab.values, &labels).visible(simd, slab.lanes)
+    }
+
+    /// The number in the middle of a cubic slab (SPEC §9): that of the cubic through the values and slopes at its planes.
+    #[inline(always)]
+    pub(super) fn middle<S: Simd>(
+        &self,
+        simd: S,
+        [f0, f1]: [f32x8<S>; 2],
+        [near, far]: &[[f32x8<S>; 3]; 2],
+        looks: &Looks<'_>,
+        [column, row]: [usize; 2],
+    ) -> f32x8<S> {
+        let to_eye = looks.to_eye(simd, self, [column, row]);
+        let [x, y, z]: [f32x8<S>; 3] = std::array::from_fn(|axis| (far[axis] - near[axis]) * to_eye[axis]);
+        let mut bend = (x + y + z) * self.bend;
+        if let Some(lengths) = &looks.rays.weights {
+            bend *= f32x8::from_slice(simd, &lengths[row][column..column + LANES]);
+        }
+        (f0 + f1) * 0.5 + bend
+    }
+
+    /// What the segments of a slab add to eight pixels, by channel; `None` if none of them shows anything there.
     #[inline(always)]
     fn amounts<S: Simd>(
         &self,
@@ -267,35 +304,65 @@ impl Frame<'_> {
         looks: &Looks<'_>,
         planes: &mut [Plane; 2],
         [column, row]: [usize; 2],
-    ) -> Option<[f32x8<S>; CHANNELS]> {
-        let (means, label) = self.means(simd, slab, looks, [column, row]);
-        let visible = means.visible(simd, slab.lanes);
-        if visible == 0 {
-            return None;
-        }
+    ) -> [Option<[f32x8<S>; CHANNELS]>; 2] {
         let zero = f32x8::splat(simd, 0.0);
-        let (mut amount, mut color) = (means.amount, means.color);
-        if let Some([red, green, blue, alpha]) = self.slab_colors(simd, slab, visible, planes, [column, row]) {
-            (amount, color) = (amount * alpha, [red, green, blue]);
-        }
-        if self.needs_gradients {
-            let [near, far] = self.gradients(simd, slab, visible, planes, [column, row]);
-            let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * means.share);
-            color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
-            if self.has_gradient_opacity {
-                let length = self.length(gradient);
-                let factors: [f32; LANES] = std::array::from_fn(|lane| {
-                    let ramp = self.transfer.tables(label(lane)).gradient_opacity;
-                    ramp.map_or(1.0, |ramp| ramp.at(length[lane]) as f32)
-                });
-                amount *= f32x8::load_array(simd, factors);
+        let labels = self.slab_labels(slab.number, slab.lanes, looks, [column, row]);
+        let [first, last] = slab.values;
+        let (mut lanes, mut values) = (slab.lanes, slab.values);
+        let (mut own, mut gradients, mut amounts) = (None, [[zero; 3]; 2], [None; 2]);
+        let mut middle = zero;
+        // The whole slab, which tells what is visible, and then the halves of the cubic profile: one place for all, because much is compiled into it.
+        for step in 0..=2 {
+            let means = self.means_between(simd, lanes, values, &labels);
+            let visible = means.visible(simd, lanes);
+            let mut part = [step as f32 * 0.5 - 0.5, 0.5];
+            if step == 0 {
+                if visible == 0 {
+                    return amounts;
+                }
+                lanes = visible;
+                own = self.slab_colors(simd, slab, visible, planes, [column, row]);
+                if self.needs_gradients {
+                    gradients = self.gradients(simd, slab, visible, planes, [column, row]);
+                }
+                if self.segments > 1 {
+                    middle = self.middle(simd, slab.values, &gradients, looks, [column, row]);
+                    values = [first, middle];
+                    continue;
+                }
+                part = [0.0, 1.0];
             }
+            let (mut amount, mut color) = (means.amount, means.color);
+            if let Some([red, green, blue, alpha]) = own {
+                (amount, color) = (amount * alpha, [red, green, blue]);
+            }
+            if self.needs_gradients {
+                let [near, far] = gradients;
+                let share = means.share * part[1] + part[0];
+                let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * share);
+                color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
+                if self.has_gradient_opacity {
+                    let length = self.length(gradient);
+                    let factors: [f32; LANES] = std::array::from_fn(|lane| {
+                        let ramp = self.transfer.tables(labels.and_then(|labels| labels[lane])).gradient_opacity;
+                        ramp.map_or(1.0, |ramp| ramp.at(length[lane]) as f32)
+                    });
+                    amount *= f32x8::load_array(simd, factors);
+                }
+            }
+            // Where nothing is visible the gradient is unknown.
+            let is_visible = mask(simd, visible);
+            let [red, green, blue] = color.map(|channel| is_visible.select(channel * amount, zero));
+            let sheet = [red, green, blue, is_visible.select(amount, zero)];
+            if self.segments == 1 {
+                return [Some(sheet), None];
+            }
+            if visible != 0 {
+                amounts[step - 1] = Some(sheet);
+            }
+            values = [middle, last];
         }
-        // Where nothing is visible the gradient is unknown.
-        let visible = mask(simd, visible);
-        let [red, green, blue] = color.map(|channel| visible.select(channel * amount, zero));
-        let amount = visible.select(amount, zero);
-        Some([red, green, blue, amount])
+        amounts
     }
 
     /// Colours shaded by gradients.

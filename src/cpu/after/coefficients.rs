@@ -22,7 +22,7 @@ use crate::lists::brick::{self, Brick, BrickList};
 use crate::lists::iso_range::ValueSet;
 use crate::scene::Scene;
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::Compositing;
+use crate::settings::splatting::{Compositing, Splatting};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{ValueSlice, Volume};
 
@@ -160,10 +160,11 @@ impl Coefficients {
     pub(in crate::cpu) fn look(
         &mut self,
         (volume, transfer): (&Volume, &TransferFunction),
-        compositing: Compositing,
+        splatting: &Splatting,
         view: &ViewGeometry,
         sharing: usize,
     ) {
+        let compositing = splatting.compositing;
         let (geometry, grid) = (PlaneGeometry::new(view, volume.grid()), volume.grid());
         let reaches = (geometry.reach(view).sharing(sharing), geometry.reach_from_cells(view));
         let half_box = geometry.widest_half_box(view);
@@ -201,7 +202,7 @@ impl Coefficients {
             (shown_voxels(of_kernels, (volume, self.all(volume)), &values, bearing), wanted)
         });
         let cells = (!compositing.is_choice()).then(|| {
-            let shown = Integrals::new(volume.labels().is_some(), transfer, compositing, &self.numbers).shown;
+            let shown = Integrals::new(volume.labels().is_some(), transfer, splatting, &self.numbers).shown;
             let all = self.all(volume);
             old_cells.filter(|(of, _)| *of == shown).unwrap_or_else(|| {
                 let cells = Cells::new(grid, all, &self.numbers, half_box, shown, Work::Shared);

@@ -63,6 +63,10 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) is_bounded: bool,
     /// Numbers that differ by less count as equal.
     pub(super) hair: f32,
+    /// The number of segments of a slab, along each of which values run linearly.
+    pub(super) segments: usize,
+    /// From a difference of gradients times a way in `unit`s to an eighth of a difference of numbers.
+    pub(super) bend: f32,
     /// Whether anything depends on gradients.
     pub(super) needs_gradients: bool,
     pub(super) has_gradient_opacity: bool,
@@ -109,6 +113,7 @@ impl<'a> Frame<'a> {
         let tables = labelled.map(|_| transfer.labels.keys()).into_iter().flatten();
         let tables = tables.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
         let has_gradient_opacity = tables.into_iter().any(|tables| tables.gradient_opacity.is_some());
+        let segments = splatting.segments() as usize;
         let mut drawn = Vec::new();
         if let Matter::Whole { coefficients, .. } = matter {
             drawn.resize_with(placement.bricks().element_product() as usize, || AtomicU8::new(0));
@@ -131,7 +136,7 @@ impl<'a> Frame<'a> {
             matter,
             transfer,
             numbers,
-            integrals: Integrals::new(labelled.is_some(), transfer, splatting.compositing, &matter.all_numbers()),
+            integrals: Integrals::new(labelled.is_some(), transfer, splatting, &matter.all_numbers()),
             shader: Shader::new(shading, splatting.compositing),
             compositor: Compositor {
                 compositing: splatting.compositing,
@@ -145,9 +150,11 @@ impl<'a> Frame<'a> {
             compositing: splatting.compositing,
             is_bounded: splatting.culling,
             hair: HAIR_OF_RANGE * (numbers.range[1] - numbers.range[0]),
-            needs_gradients: shading.enabled || has_gradient_opacity,
+            segments,
+            needs_gradients: shading.enabled || has_gradient_opacity || segments > 1,
             has_gradient_opacity,
             per_number: (1.0 / numbers.scale) as f32,
+            bend: (grid.unit() / field.gradient_length / 8.0) as f32,
             // A length of 0 is below it.
             min_gradient: ((MIN_GRADIENT * numbers.scale * field.gradient_length) as f32).max(f32::MIN_POSITIVE),
             field,

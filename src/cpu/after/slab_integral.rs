@@ -10,7 +10,7 @@ use crate::after::normalization::Normalization;
 use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
 use crate::cpu::count::bits;
 use crate::cpu::vector::{LANES, columns, mask, optical_depth};
-use crate::settings::splatting::Compositing;
+use crate::settings::splatting::{Compositing, Splatting};
 use crate::settings::transfer_function::TransferFunction;
 
 /// One set of tables.
@@ -30,6 +30,8 @@ struct Covered {
     shown: [f32; 2],
     /// The min and the max number.
     all: [f32; 2],
+    /// Where bins begin.
+    origin: f32,
     bins_per_number: f32,
     last_bin: f32,
 }
@@ -93,11 +95,12 @@ type Sums<S> = [f32x8<S>; 5];
 
 impl Table {
     fn new(points: Vec<[f32; 4]>) -> Self {
-        let ([cells, bin_count, low, high], [first, bins_per_number, end, _]) = (points[0], points[1]);
+        let ([cells, bin_count, low, high], [first, bins_per_number, end, origin]) = (points[0], points[1]);
         let cell_points = HEAD + bin_count as usize;
         let bins = points[HEAD..cell_points].iter().map(|&[first, last, ..]| [first as u32, last as u32]).collect();
         let cells = points[cell_points..][..CELL * cells as usize].as_chunks().0.to_vec();
-        let covered = Covered { shown: [low, high], all: [first, end], bins_per_number, last_bin: bin_count - 1.0 };
+        let last_bin = bin_count - 1.0;
+        let covered = Covered { shown: [low, high], all: [first, end], origin, bins_per_number, last_bin };
         Self { bins, cells, covered, points }
     }
 
@@ -127,8 +130,9 @@ impl<S: Simd> Between<S> {
         let (low, high) = (is_rising.select(x0, x1), is_rising.select(x1, x0));
         let is_hidden = high.simd_lt(of(|covered| covered.shown[0])) | low.simd_gt(of(|covered| covered.shown[1]));
         let (per_number, last_bin) = (of(|covered| covered.bins_per_number), of(|covered| covered.last_bin));
+        let origin = of(|covered| covered.origin);
         let bins = [low, high].map(|x| {
-            let bin = within((x - least) * per_number, [f32x8::splat(simd, 0.0), last_bin]);
+            let bin = within((x - origin) * per_number, [f32x8::splat(simd, 0.0), last_bin]);
             bin.to_int::<i32x8<S>>().to_array()
         });
         Self { low, high, bins, lanes: lanes & !(is_hidden.to_bitmask() as u32) }
@@ -165,10 +169,10 @@ impl Integrals {
     pub(super) fn new(
         has_labels: bool,
         transfer: &TransferFunction,
-        compositing: Compositing,
+        splatting: &Splatting,
         numbers: &Normalization,
     ) -> Self {
-        let table = |label| Table::new(slab_integral::table(&transfer.tables(label), compositing, numbers));
+        let table = |label| Table::new(slab_integral::table(&transfer.tables(label), splatting, numbers));
         let labels = has_labels.then(|| transfer.labels.keys()).into_iter().flatten();
         let labels: BTreeMap<u16, Table> = labels.map(|&label| (label, table(Some(label)))).collect();
         let plain = table(None);
@@ -178,7 +182,7 @@ impl Integrals {
                 if table.covered.shown[1] > high { table.covered.shown[1] } else { high },
             ]
         });
-        Self { is_optical_depth: compositing == Compositing::Exponential, plain, labels, shown }
+        Self { is_optical_depth: splatting.compositing == Compositing::Exponential, plain, labels, shown }
     }
 
     /// The table for the voxels of a label.

@@ -1,5 +1,5 @@
 //! `surface` after splatting (SPEC §9): where along a ray `opacity·gradient_opacity` first reaches one half, the pixel is opaque and has that
-//! point's shaded colour. Values and gradients are linear from plane to plane.
+//! point's shaded colour. Values are linear along segments of slabs, gradients from plane to plane.
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
@@ -21,10 +21,14 @@ const SAMPLES: u32 = 32;
 /// Halvings of the stretch between two samples that holds the surface.
 const HALVINGS: u32 = 30;
 
-/// A pixel's line through a slab, where one set of tables holds. Places are shares of the slab.
+/// A pixel's line through a segment of a slab, where one set of tables holds. Places are shares of the slab.
+#[derive(Clone, Copy)]
 struct Line<'a> {
     tables: Tables<'a>,
+    /// The segment's ends, and the values there.
+    segment: [f64; 2],
     values: [f64; 2],
+    /// The gradients at the slab's planes.
     gradients: [DVec3; 2],
     /// From where to where.
     ends: [f64; 2],
@@ -52,29 +56,43 @@ impl Frame<'_> {
         let gradients = lines.map(|gradient| gradient.map(f32x8::to_array));
         let own = self.slab_colors(simd, slab, slab.lanes, planes, [column, row]);
         let own = own.map(|own| own.map(f32x8::to_array));
+        let (bent, middles) = match self.segments {
+            1 => (0, [0.0; LANES]),
+            _ => {
+                let middle = self.middle(simd, slab.values, &lines, looks, [column, row]);
+                (self.visible(simd, slab, looks, [column, row]), middle.to_array())
+            }
+        };
         let (mut found, mut places, mut colors) = (0, [0.0; LANES], [[0.0; LANES]; 3]);
         for lane in (0..LANES).filter(|lane| slab.lanes >> lane & 1 == 1) {
             let [start, end] = [starts[lane].max(0.0), ends[lane].min(1.0)].map(f64::from);
-            let values = numbers.map(|numbers| self.value(numbers[lane]));
+            let [f0, f1] = numbers.map(|numbers| self.value(numbers[lane]));
             let gradients = gradients.map(|[x, y, z]| {
                 let per_world = f64::from(self.per_number) / self.field.gradient_length;
                 DVec3::new(x[lane].into(), y[lane].into(), z[lane].into()) * per_world
             });
             let at = [looks.origin[0] + column + lane, looks.origin[1] + row];
-            for ends in self.pieces(at, f64::from(slab.number), [start, end]) {
-                let middle = f64::from(slab.number) + (ends[0] + ends[1]) / 2.0;
-                let label = if self.labels { self.label(at, 0, middle) } else { None };
-                let own_alpha = own.map_or(1.0, |[.., alpha]| alpha[lane].into());
-                let line = Line { tables: self.transfer.tables(label), values, gradients, ends, own: own_alpha };
-                if let Some(place) = line.first_surface() {
-                    let color = line.tables.color.at(line.value(place));
-                    (0..3).for_each(|channel| {
-                        colors[channel][lane] = own.map_or(color[channel] as f32, |own| own[channel][lane]);
-                    });
-                    places[lane] = place as f32;
-                    found |= 1 << lane;
-                    break;
-                }
+            let middle = self.value(middles[lane]);
+            let halves = [([0.0, 0.5], [f0, middle]), ([0.5, 1.0], [middle, f1])];
+            let segments = if bent >> lane & 1 == 1 { &halves[..] } else { &[([0.0, 1.0], [f0, f1])] };
+            let own_alpha = own.map_or(1.0, |[.., alpha]| alpha[lane].into());
+            let surface = segments.iter().find_map(|&(segment, values)| {
+                let part = [start.max(segment[0]), end.min(segment[1])];
+                self.pieces(at, f64::from(slab.number), part).into_iter().find_map(|ends| {
+                    let middle = f64::from(slab.number) + (ends[0] + ends[1]) / 2.0;
+                    let label = if self.labels { self.label(at, 0, middle) } else { None };
+                    let tables = self.transfer.tables(label);
+                    let line = Line { tables, segment, values, gradients, ends, own: own_alpha };
+                    line.first_surface().map(|place| (line, place))
+                })
+            });
+            if let Some((line, place)) = surface {
+                let color = line.tables.color.at(line.value(place));
+                (0..3).for_each(|channel| {
+                    colors[channel][lane] = own.map_or(color[channel] as f32, |own| own[channel][lane]);
+                });
+                places[lane] = place as f32;
+                found |= 1 << lane;
             }
         }
         if found == 0 {
@@ -120,7 +138,8 @@ impl Frame<'_> {
 
 impl Line<'_> {
     fn value(&self, place: f64) -> f64 {
-        self.values[0] + (self.values[1] - self.values[0]) * place
+        let [start, end] = self.segment;
+        self.values[0] + (self.values[1] - self.values[0]) * ((place - start) / (end - start))
     }
 
     /// The opacity at a place, whatever the iso-ranges.
@@ -139,10 +158,12 @@ impl Line<'_> {
     /// The places between which the opacity's ramp has no kink and no iso-range ends, with both ends.
     fn knots(&self) -> Vec<f64> {
         let [f0, f1] = self.values;
-        let [start, end] = self.ends;
+        let ([start, end], [from, to]) = (self.ends, self.segment);
         let iso_ranges = self.tables.iso_ranges.iter().flat_map(|ranges| ranges.iter().flatten().copied());
         let values = self.tables.opacity.points().iter().map(|point| point.0).chain(iso_ranges);
-        let places = values.map(|value| (value - f0) / (f1 - f0)).filter(|&place| start < place && place < end);
+        let places = values
+            .map(|value| from + (to - from) * ((value - f0) / (f1 - f0)))
+            .filter(|&place| start < place && place < end);
         let mut knots: Vec<f64> = places.chain([start, end]).collect();
         knots.sort_by(f64::total_cmp);
         knots

@@ -16,11 +16,12 @@ use super::planes::Plane;
 use super::search::Search;
 use super::sheet::SlabSheet;
 use crate::cpu::bin::Placed;
+use crate::cpu::composite::{Stretch, tiles_of};
 use crate::cpu::count::Tally;
 use crate::cpu::cull::{OpenMask, Pixels, columns_between};
 use crate::cpu::cut::TileRays;
 use crate::cpu::project::floor;
-use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
+use crate::cpu::sheets::{Buffers, COLUMNS, ROWS, Sheet};
 use crate::part::Extreme;
 use crate::settings::splatting::Compositing;
 
@@ -47,7 +48,8 @@ pub(super) struct TileWalk<'a> {
     open: OpenMask,
     rays: TileRays,
     to_eye: Vec<[[f32; COLUMNS]; 3]>,
-    sheet: SlabSheet,
+    /// The sheets of the current slab's segments.
+    sheets: Vec<SlabSheet>,
     buffers: Buffers,
     chosen: Chosen,
     search: Search,
@@ -78,7 +80,7 @@ impl<'a> TileWalk<'a> {
             open: OpenMask::new(COLUMNS, ROWS),
             rays: TileRays::default(),
             to_eye: Vec::new(),
-            sheet: SlabSheet::new(),
+            sheets: (0..frame.segments).map(|_| SlabSheet::new()).collect(),
             buffers: Buffers::new(),
             chosen: Chosen::new(frame.compositing, frame.field.has_colors()),
             search: Search::new(frame.field.has_colors()),
@@ -236,7 +238,7 @@ impl<'a> TileWalk<'a> {
     /// Classifies and composites a slab.
     #[inline(always)]
     fn composite<S: Simd>(&mut self, simd: S, slab: i32) {
-        let Self { frame, open, rays, to_eye, sheet, buffers, tally, channels, chosen, .. } = self;
+        let Self { frame, open, rays, to_eye, sheets, buffers, tally, channels, chosen, .. } = self;
         let looks = Looks::new(self.origin, rays, to_eye);
         for channel in channels.iter_mut().filter(|channel| !channel.active.is_empty()) {
             let wanted = channel.wanted(open);
@@ -245,16 +247,19 @@ impl<'a> TileWalk<'a> {
                 frame.choose(simd, &looks, planes, &wanted, chosen);
             } else {
                 frame.find_wide(simd, slab, &looks, planes, &wanted);
-                frame.classify(simd, slab, &looks, planes, &wanted, open, (sheet, buffers));
+                frame.classify(simd, slab, &looks, planes, &wanted, open, (sheets, buffers));
             }
         }
         if frame.compositing.is_choice() || frame.compositing == Compositing::Surface {
             return;
         }
-        let begin = rays.begin(slab);
-        let tiles = frame.compositor.composite(simd, sheet, buffers, (rays, begin), open);
         if self.touched.contains(&slab) {
-            tally.tiles_composited += tiles;
+            let filled = sheets.iter().fold(0, |rows, sheet| rows | sheet.rows());
+            tally.tiles_composited += tiles_of(filled & open.rows());
+        }
+        for (number, sheet) in sheets.iter_mut().enumerate() {
+            let segment = Stretch::segment(rays.begin(slab), number, frame.segments);
+            frame.compositor.composite(simd, sheet, buffers, (rays, segment), open);
         }
     }
 }

@@ -1,5 +1,7 @@
 //! One pixel composited (SPEC §9).
 
+use std::ops::Range;
+
 use glam::DVec4;
 
 use super::pixel::{Composited, Pixel, Slab};
@@ -20,7 +22,8 @@ pub(super) fn composite(channels: &[Pixel]) -> Composited {
     }
 }
 
-/// Composites front to back; the other order gives the same image. A sheet is the sum of all channels' (SPEC §10).
+/// Composites front to back; the other order gives the same image. A sheet is the sum of all channels' (SPEC §10), a slab's
+/// one or two.
 fn composite_sheets(channels: &[Pixel]) -> Composited {
     let first = &channels[0];
     let (compositing, wanted) = (first.frame.scene.splatting.compositing, first.frame.host.first_hit);
@@ -28,20 +31,22 @@ fn composite_sheets(channels: &[Pixel]) -> Composited {
     let slabs = first.slabs();
     let mut nears: Vec<Option<f64>> = channels.iter().map(|channel| channel.value(slabs.start)).collect();
     for k in slabs {
-        let mut sum = None;
+        let mut sums: Vec<(Range<f64>, DVec4)> = Vec::new();
         for (channel, near) in channels.iter().zip(&mut nears) {
             let far = channel.value(k + 1);
-            if let Some(slab) = Slab::new(k, *near, far) {
-                *sum.get_or_insert(DVec4::ZERO) += channel.sheet(&slab);
+            let sheets = Slab::new(k, *near, far).map(|slab| channel.sheets(&slab)).unwrap_or_default();
+            if sums.is_empty() {
+                sums = sheets;
+            } else {
+                sums.iter_mut().zip(sheets).for_each(|((_, sum), (_, sheet))| *sum += sheet);
             }
             *near = far;
         }
-        if let Some(sheet) = sum {
+        for (shown, sheet) in sums {
             let before = pixel.color.w;
             composite_pixel(&mut pixel.color, sheet, compositing, Order::FrontToBack);
             let after = pixel.color.w;
             if let Some(opacity) = wanted.filter(|&opacity| pixel.first_hit.is_none() && after >= opacity) {
-                let shown = first.shown(k);
                 let share = if after > before { (opacity - before) / (after - before) } else { 0.0 };
                 pixel.first_hit = Some(shown.start + (shown.end - shown.start) * share);
             }

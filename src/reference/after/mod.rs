@@ -8,7 +8,7 @@
 //! - [`coefficients`]: `c = v` (`smooth`), or the c for which `f(v_j) = v_j` at every voxel (`exact`).
 //! - [`field`]: `f = Σ c_i·g_i / N` with `g_i = exp(-falloff·|δ_i|²)`, `N = Σ g_i`, and `∇f`, on the slab planes ([`Frame::plane_field`]);
 //!   [`low_pass`] transforms the offsets δ_i where pixels are large.
-//! - [`slab_integral`]: `m̄ = mean of m`, `C̄ = ∫m·C / ∫m`, `v̄ = ∫m·v / ∫m` over the values from plane to plane.
+//! - [`slab_integral`]: `m̄ = mean of m`, `C̄ = ∫m·C / ∫m`, `v̄ = ∫m·v / ∫m` over the values of a segment: from plane to plane, or to the middle between them.
 //! - [`pixel`]: the sheet `(C·m̄, m̄)·ℓ` with C the C̄ shaded by the gradient at v̄, ℓ the length of the pixel's ray ([`Frame::slab_sheet`]);
 //!   its compositing; `extreme` and `surface` use the values themselves.
 //!
@@ -26,7 +26,7 @@ pub mod pixel;
 pub mod slab_integral;
 mod surface;
 
-use glam::UVec2;
+use glam::{DVec4, UVec2};
 
 use super::{Areas, Buffer, Culled, Host, resolve};
 use crate::error::RenderError;
@@ -42,7 +42,7 @@ use crate::volume::Volume;
 pub use counts::count;
 pub use field::Field;
 pub use frame::Frame;
-pub use pixel::{Composited, Pixel, Sample, Slab};
+pub use pixel::{Composited, Pixel, Sample, Segment, Slab};
 
 impl Frame<'_> {
     /// The pixel at a position counted from the upper left.
@@ -55,9 +55,12 @@ impl Frame<'_> {
         self.each_pixel(|pixel| pixel.sample(plane))
     }
 
-    /// A slab's sheet for all pixels.
-    pub fn slab_sheet(&self, number: i32) -> Buffer {
-        let sheet = |pixel: Pixel| pixel.slab(number).map(|slab| pixel.sheet(&slab)).unwrap_or_default();
+    /// The sheet of one of a slab's segments for all pixels.
+    pub fn slab_sheet(&self, number: i32, segment: usize) -> Buffer {
+        let sheet = |pixel: Pixel| {
+            let sheets = pixel.slab(number).map(|slab| pixel.sheets(&slab)).unwrap_or_default();
+            sheets.get(segment).map_or(DVec4::ZERO, |(_, sheet)| *sheet)
+        };
         Buffer { width: self.geometry.size.x as usize, pixels: self.each_pixel(sheet) }
     }
 

@@ -12,6 +12,7 @@ use crate::part::Extreme;
 use crate::reference::cut::{self, PixelRay};
 use crate::reference::means::volume_box;
 use crate::reference::shading;
+use crate::settings::splatting::SlabProfile;
 use crate::settings::transfer_function::Tables;
 
 /// The ray of a pixel's centre. Positions on it are counted in sheets: slab k lies between planes k and k + 1.
@@ -56,6 +57,15 @@ impl Slab {
         };
         Some(Self { number, values, planes })
     }
+}
+
+/// A stretch of a slab along which values run linearly: the slab, or one of the halves of its cubic profile. Gradients run linearly along the slab.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Its ends, from 0 at the slab's near plane to 1 at its far plane.
+    pub ends: [f64; 2],
+    /// The values there.
+    pub values: [f64; 2],
 }
 
 /// A composited pixel, before the background.
@@ -191,26 +201,56 @@ impl<'a> Pixel<'a> {
         [first, if near == far { first } else { self.gradient(far) }]
     }
 
-    /// A slab's sheet: `(C·m, m)·ℓ`.
-    pub fn sheet(&self, slab: &Slab) -> DVec4 {
-        let (scene, shown) = (&self.frame.scene, self.shown(slab.number));
-        if shown.is_empty() {
-            return DVec4::ZERO;
+    /// The segments of a slab: by the cubic profile two halves, unless the slab shows nothing.
+    pub fn segments(&self, slab: &Slab) -> Vec<Segment> {
+        if self.frame.scene.splatting.slab_profile == SlabProfile::Linear || self.means(slab).is_none() {
+            return vec![Segment { ends: [0.0, 1.0], values: slab.values }];
         }
-        let tables = self.tables((shown.start + shown.end) / 2.0);
-        let Some(means) = SlabIntegral::new(&tables, scene.splatting.compositing, slab.values) else {
-            return DVec4::ZERO;
+        // The middle of the cubic through both values and slopes.
+        let ([f0, f1], [g0, g1]) = (slab.values, self.gradients(slab));
+        let way = (self.at(1.0) - self.at(0.0)) * self.frame.geometry.grid.spacing;
+        let middle = (f0 + f1) / 2.0 + (g0 - g1).dot(way) / 8.0;
+        vec![Segment { ends: [0.0, 0.5], values: [f0, middle] }, Segment { ends: [0.5, 1.0], values: [middle, f1] }]
+    }
+
+    /// The tables for the middle of the stretch in a slab.
+    fn slab_tables(&self, slab: i32) -> Tables<'a> {
+        let shown = self.shown(slab);
+        self.tables((shown.start + shown.end) / 2.0)
+    }
+
+    /// The means over the values between a slab's planes.
+    fn means(&self, slab: &Slab) -> Option<SlabIntegral> {
+        let compositing = self.frame.scene.splatting.compositing;
+        SlabIntegral::new(&self.slab_tables(slab.number), compositing, slab.values)
+    }
+
+    /// A slab's sheets, `(C·m, m)·ℓ`, one for each segment, with the part of the ray that it shows; none if the slab shows nothing.
+    pub fn sheets(&self, slab: &Slab) -> Vec<(Range<f64>, DVec4)> {
+        let (scene, shown, first) = (&self.frame.scene, self.shown(slab.number), f64::from(slab.number));
+        if shown.is_empty() || self.means(slab).is_none() {
+            return Vec::new();
+        }
+        let tables = self.slab_tables(slab.number);
+        let own = self.slab_color(slab);
+        let needs_gradients = scene.shading.enabled || tables.gradient_opacity.is_some();
+        let gradients = needs_gradients.then(|| self.gradients(slab));
+        let sheet = |Segment { ends, values }: Segment| {
+            let part = shown.start.max(first + ends[0])..shown.end.min(first + ends[1]);
+            let means = SlabIntegral::new(&tables, scene.splatting.compositing, values);
+            let Some(means) = means.filter(|_| part.start < part.end) else { return (part, DVec4::ZERO) };
+            let (mut amount, mut color) = (means.amount, means.color);
+            if let Some(own) = own {
+                (amount, color) = (amount * own.w, own.truncate());
+            }
+            if let Some([near, far]) = gradients {
+                let gradient = near.lerp(far, ends[0] + (ends[1] - ends[0]) * means.share);
+                amount *= tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient.length()));
+                color = shading::color(&scene.shading, color, gradient, self.to_eye());
+            }
+            let length = (part.end - part.start) * self.length_per_sheet;
+            (part, color.extend(1.0) * amount * length)
         };
-        let (mut amount, mut color) = (means.amount, means.color);
-        if let Some(own) = self.slab_color(slab) {
-            (amount, color) = (amount * own.w, own.truncate());
-        }
-        if scene.shading.enabled || tables.gradient_opacity.is_some() {
-            let [near, far] = self.gradients(slab);
-            let gradient = near.lerp(far, means.share);
-            amount *= tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient.length()));
-            color = shading::color(&scene.shading, color, gradient, self.to_eye());
-        }
-        color.extend(1.0) * amount * (shown.end - shown.start) * self.length_per_sheet
+        self.segments(slab).into_iter().map(sheet).collect()
     }
 }

@@ -1,5 +1,5 @@
 //! `surface` after splatting (SPEC §9): the pixel is opaque, with the shaded colour of the point, where `opacity·gradient_opacity` first
-//! reaches one half along the ray. Values and gradients are linear from plane to plane.
+//! reaches one half along the ray. Values are linear along segments of slabs, gradients from plane to plane.
 
 use std::cell::LazyCell;
 
@@ -40,31 +40,35 @@ fn in_slab(pixel: &Pixel, slab: &Slab) -> Option<Composited> {
     let first = f64::from(slab.number);
     let gradients = LazyCell::new(|| pixel.gradients(slab));
     let gradient = |t: f64| gradients[0].lerp(gradients[1], t);
-    let [f0, f1] = slab.values;
     let own = pixel.slab_color(slab);
     let opacity = own.map_or(1.0, |own| own.w);
-    for [start, end] in cells(pixel, slab.number) {
-        let tables = pixel.tables(first + (start + end) / 2.0);
-        let values = [f0 + (f1 - f0) * start, f0 + (f1 - f0) * end];
-        let line = Line { tables, values, start, end, opacity };
-        if let Some(t) = line.first_surface(&gradient) {
-            let scene = &pixel.frame().scene;
-            let base = own.map_or_else(|| tables.color.at(f0 + (f1 - f0) * t), DVec4::truncate);
-            let color = shading::color(&scene.shading, base, gradient(t), pixel.to_eye()).extend(1.0);
-            return Some(Composited::new(color, pixel.frame().host.first_hit.map(|_| first + t)));
+    for segment in pixel.segments(slab) {
+        let value = |t: f64| {
+            let ([start, end], [f0, f1]) = (segment.ends, segment.values);
+            f0 + (f1 - f0) * ((t - start) / (end - start))
+        };
+        for [start, end] in cells(pixel, slab.number, segment.ends) {
+            let tables = pixel.tables(first + (start + end) / 2.0);
+            let line = Line { tables, values: [start, end].map(value), start, end, opacity };
+            if let Some(t) = line.first_surface(&gradient) {
+                let scene = &pixel.frame().scene;
+                let base = own.map_or_else(|| tables.color.at(value(t)), DVec4::truncate);
+                let color = shading::color(&scene.shading, base, gradient(t), pixel.to_eye()).extend(1.0);
+                return Some(Composited::new(color, pixel.frame().host.first_hit.map(|_| first + t)));
+            }
         }
     }
     None
 }
 
-/// The visible part of a slab, from 0 at its near plane to 1 at its far plane, split where the ray passes from one voxel's cell into
-/// another's if their labels may differ.
-fn cells(pixel: &Pixel, slab: i32) -> Vec<[f64; 2]> {
+/// The visible part of a stretch of a slab, whose places run from 0 at its near plane to 1 at its far plane, split where the ray passes from one voxel's cell
+/// into another's if their labels may differ.
+fn cells(pixel: &Pixel, slab: i32, ends: [f64; 2]) -> Vec<[f64; 2]> {
     let (shown, first) = (pixel.shown(slab), f64::from(slab));
-    if shown.is_empty() {
+    let (start, end) = (ends[0].max(shown.start - first), ends[1].min(shown.end - first));
+    if start >= end {
         return Vec::new();
     }
-    let (start, end) = (shown.start - first, shown.end - first);
     let mut cuts = vec![start, end];
     if pixel.frame().volume.labels().is_some() {
         let [from, to] = [start, end].map(|t| pixel.at(first + t) + 0.5);

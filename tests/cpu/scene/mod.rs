@@ -10,7 +10,7 @@ use glam::DVec3;
 use sheetsplat::scene::{Fitting, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::settings::{
     Camera, Classification, Clip, Compositing, Economies, Fit, FootprintBox, FootprintForm, Gradient, Interpolation,
-    LabelTables, Light, Method, Order, Projection, Ramp, Rasterizer, Shading, Splatting,
+    LabelTables, Light, Method, Order, Projection, Ramp, Rasterizer, Shading, SlabProfile, Splatting,
 };
 
 use crate::common::shared::shared;
@@ -128,6 +128,7 @@ fn every_key() {
         classification = "before"
         interpolation = "exact"
         slab_width = 0.05
+        slab_profile = "linear"
         footprint = "sections"
         compositing = "exponential"
         order = "back-to-front"
@@ -202,6 +203,7 @@ fn every_key() {
             classification: Classification::Before,
             interpolation: Interpolation::Exact,
             slab_width: 0.05,
+            slab_profile: SlabProfile::Linear,
             footprint: FootprintForm::Sections,
             compositing: Compositing::Exponential,
             order: Order::BackToFront,

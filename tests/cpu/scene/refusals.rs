@@ -232,7 +232,7 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
         "true",
         "splatting.tile",
         "an unknown key",
-        "method, radius, falloff, slab_width, classification, interpolation, footprint",
+        "method, radius, falloff, slab_width, slab_profile, classification, interpolation, footprint",
     ),
 ];
 

@@ -86,7 +86,10 @@ fn sheets_make_the_image() {
         let (first, end) = slabs.fold((i32::MAX, i32::MIN), |(a, b), slabs| (a.min(slabs.start), b.max(slabs.end)));
         let mut acc = reference::Buffer::new(24, 20);
         for k in first..end {
-            reference::composite::composite(&mut acc, &frame.slab_sheet(k), compositing, scene.splatting.order);
+            for segment in 0..2 {
+                let sheet = frame.slab_sheet(k, segment);
+                reference::composite::composite(&mut acc, &sheet, compositing, scene.splatting.order);
+            }
         }
         let image = render(&volume, &scene);
         assert!(image.pixels.iter().any(|pixel| pixel[3] > 0.9));

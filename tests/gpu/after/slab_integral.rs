@@ -6,7 +6,7 @@ use glam::DVec3;
 use sheetsplat::internals::after::normalization::Normalization;
 use sheetsplat::internals::after::slab_integral::{SlabIntegral, table};
 use sheetsplat::internals::reference::after::slab_integral::SlabIntegral as Twin;
-use sheetsplat::settings::{Compositing, Ramp, TransferFunction};
+use sheetsplat::settings::{Compositing, Ramp, SlabProfile, Splatting, TransferFunction};
 
 use crate::common::Random;
 
@@ -54,7 +54,11 @@ fn tables_are_the_quadrature() {
         let tables = transfer.tables(None);
         let compositing = random.pick(&[Compositing::Linear, Compositing::Exponential]);
         let numbers = Normalization::new(range);
-        let points = table(&tables, compositing, &numbers);
+        let slab_profile = random.pick(&[SlabProfile::Linear, SlabProfile::Cubic]);
+        let points = table(&tables, &Splatting { compositing, slab_profile, ..Splatting::default() }, &numbers);
+        // The middles of cubic slabs lie beyond all values.
+        let size = if slab_profile == SlabProfile::Cubic { range[1] - range[0] } else { 0.0 };
+        let range = [range[0] - size, range[1] + size];
         for _ in 0..8 {
             let f0 = random.uniform(range[0], range[1]);
             let step = random.pick(&[0.0, 1e-6, 0.01, 1.0, 30.0, 3e4]) * random.uniform(-1.0, 1.0);
@@ -97,7 +101,7 @@ fn narrow_peaks_beside_plateaus() {
         further: Vec::new(),
     };
     let numbers = Normalization::new([0.0, 65535.0]);
-    let points = table(&transfer.tables(None), Compositing::Linear, &numbers);
+    let points = table(&transfer.tables(None), &Splatting::default(), &numbers);
     let ends = [65050.0, 65400.0].map(|value| numbers.apply(value) as f32);
     let ours = SlabIntegral::new(&points, Compositing::Linear, ends).unwrap();
     let expected = 0.005 / 350.0;

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use eframe::egui::{ComboBox, Grid, Slider, Ui};
 use glam::DVec3;
-use sheetsplat::settings::{Classification, Compositing, Interpolation, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{Classification, Compositing, Interpolation, Method, Rasterizer, SlabProfile, Splatting};
 use sheetsplat::settings::{Gradient, Light, Shading};
 use sheetsplat::stats::Stats;
 
@@ -49,6 +49,8 @@ pub(super) fn splatting(ui: &mut Ui, splatting: &mut Splatting) {
         let interpolations =
             [(Interpolation::Smooth, "smooth"), (Interpolation::Exact, "exact"), (Interpolation::Auto, "auto")];
         choice(ui, "interpolation", &mut splatting.interpolation, &interpolations);
+        let profiles = [(SlabProfile::Linear, "linear"), (SlabProfile::Cubic, "cubic")];
+        choice(ui, "slab profile", &mut splatting.slab_profile, &profiles);
     }
     choice(
         ui,

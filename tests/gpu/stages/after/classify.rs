@@ -102,6 +102,7 @@ fn classified(prepared: &Prepared<'_>, twin: &Frame<'_>, rays: Rays<'_>) -> (Vec
         page_bits: 0,
         channels: 1,
         own_colors: false,
+        segments: scene.splatting.segments(),
     };
     let carried = init(device, &vec![0_u8; pixels * CARRIED_BYTES as usize], BufferUsages::STORAGE);
     let bound = [stage.bind(device, mode, buffers, (band, &carried))];

@@ -92,7 +92,13 @@ fn gathered(prepared: &Prepared<'_>, stage: &Gather, first_hit: Option<f64>, ban
     let labels = volume.labels().map(|labels| VolumeTexture::upload_labels(device, queue, labels).unwrap());
     let mode = GatherMode::of(
         splatting,
-        Some(PlaneMode { gradient: scene.shading.gradient, exact: prepared.is_exact(), layers: 1, own_colors: false }),
+        Some(PlaneMode {
+            gradient: scene.shading.gradient,
+            exact: prepared.is_exact(),
+            layers: 1,
+            own_colors: false,
+            segments: splatting.segments(),
+        }),
         view.perspective.is_some(),
         [labels.is_some(), prepared.has_holes()],
         rays,

@@ -106,11 +106,7 @@ impl<'a> Prepared<'a> {
         let view = ViewGeometry::new(grid, &scene.camera, splatting, [scene.image.width, scene.image.height]).unwrap();
         let coefficients: Vec<f32> = twin.field().coefficients().iter().map(|&c| c as f32).collect();
         let numbers = Normalization::of(coefficients.iter().copied()).unwrap();
-        let integration = Integration {
-            compositing: splatting.compositing,
-            numbers: std::slice::from_ref(&numbers),
-            radius: splatting.radius,
-        };
+        let integration = Integration { splatting, numbers: std::slice::from_ref(&numbers) };
         let ramps = Ramps::of_channels(transfer, &[Stored { labels: 1, colors: 0 }], 0, Some(integration));
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
         let values = VolumeTexture::upload(device, queue, volume.values()).unwrap();
