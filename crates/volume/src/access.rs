@@ -6,8 +6,8 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::string::FromUtf8Error;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::VolumeError;
 use super::address;
@@ -17,6 +17,8 @@ use super::inputs::Inputs;
 use super::located::{Located, Notes};
 use super::memory;
 use super::outputs::Outputs;
+use super::rounding::Rounding;
+use super::sample_type::SampleType;
 use super::series::Selection;
 
 /// Options for reading volumes, labels and scenes. By default files may lie anywhere.
@@ -153,6 +155,10 @@ struct Inner {
     bytes_read: Option<BytesRead>,
     outputs: Outputs,
     inputs: Option<Inputs>,
+    /// What samples have lost since the last warning.
+    rounding: Mutex<Rounding>,
+    /// Whether a file that is read by boxes has warned of that.
+    has_warned: AtomicBool,
 }
 
 /// The folder to which files are confined.
@@ -174,7 +180,8 @@ impl Access {
         let limit = options.memory_limit();
         let (reserved, bytes_read) = (AtomicU64::new(0), options.bytes_read.clone());
         let (outputs, inputs) = (options.outputs.clone(), options.inputs.clone());
-        let inner = Inner { given, folder, limit, reserved, bytes_read, outputs, inputs };
+        let (rounding, has_warned) = Default::default();
+        let inner = Inner { given, folder, limit, reserved, bytes_read, outputs, inputs, rounding, has_warned };
         Ok(Self(
             Arc::new(inner),
             Selection { channel: options.channel, time: options.time, level: options.level },
@@ -198,6 +205,27 @@ impl Access {
     pub(super) fn note(&self, located: Located) {
         if let Some(notes) = &self.2 {
             notes.lock().unwrap_or_else(PoisonError::into_inner).push(located);
+        }
+    }
+
+    /// Notes what samples have lost.
+    pub(super) fn note_rounding(&self, rounding: Rounding) {
+        if rounding != Rounding::default() {
+            let mut all = self.0.rounding.lock().unwrap_or_else(PoisonError::into_inner);
+            *all = all.max(rounding);
+        }
+    }
+
+    /// What samples have lost since the last call.
+    pub(super) fn take_rounding(&self) -> Rounding {
+        std::mem::take(&mut self.0.rounding.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Warns at the first box of a store with whole numbers that were rounded.
+    pub(super) fn warn_of_box(&self, path: &Path, kind: SampleType, values: &[f32]) {
+        let rounding = self.take_rounding();
+        if rounding.is_of_whole_numbers() && !self.0.has_warned.swap(true, Ordering::Relaxed) {
+            rounding.warn(path, kind, values.into());
         }
     }
 

@@ -31,7 +31,6 @@ mod folder;
 mod format;
 mod grid;
 mod guard;
-#[cfg(any(feature = "npy", feature = "tiff", feature = "zarr"))]
 mod half;
 mod head;
 mod identity;
@@ -60,6 +59,7 @@ pub mod parallel;
 pub mod range;
 mod raw;
 mod resample;
+mod rounding;
 mod sample;
 mod sample_type;
 mod samples;

@@ -9,7 +9,7 @@ use super::access::{Access, ReadOptions};
 use super::error::volume::{VolumeError, invalid, refused};
 use super::format;
 use super::loaded::{Levels, Loaded};
-use super::store::{Store, StoreFacts, facts_of_channel};
+use super::store::{Store, StoreFacts};
 use super::texel::COLOR_BYTES;
 use super::values::Values;
 use super::volume::Volume;
@@ -42,11 +42,12 @@ impl Volume {
         let first_channel = access.selection().channel.unwrap_or(0) as usize;
         let channels = first_channel..(loaded.series.channels as usize).max(first_channel + 1);
         let facts: Vec<StoreFacts> =
-            channels.enumerate().map(|(at, channel)| facts_of_channel(loaded.facts(format, channel), at)).collect();
+            channels.enumerate().map(|(at, channel)| loaded.facts(format, channel, at)).collect();
         let mut facts = facts.into_iter();
         let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();
         let spacing = spacing.unwrap_or(DVec3::ONE);
+        access.take_rounding().warn(path, sample_type, values.as_slice());
         if series.is_color {
             let bytes = COLOR_BYTES * u64::from(dims.element_product());
             access.reserve(path, "data", format!("{dims} voxels with colours"), bytes)?;

@@ -167,7 +167,7 @@ impl Header {
                     // The number of components may be missing, so these words are on one line.
                     let line = self.file.line(&mut self.budget)?.unwrap_or_default();
                     let mut words = line.split_whitespace();
-                    let kind = self.kind(words.next().unwrap_or_default())?;
+                    let kind = words.next().unwrap_or_default();
                     let components = words.next().map_or(Ok(1), |number| self.number("SCALARS", number))?;
                     let [lookup_table, _name] = self.words()?;
                     if !lookup_table.eq_ignore_ascii_case("LOOKUP_TABLE") {
@@ -175,16 +175,34 @@ impl Header {
                         return Err(self.fields.invalid("SCALARS", shown(&lookup_table), allowed));
                     }
                     self.begin_samples()?;
-                    if components == 1 {
-                        return Ok(Array { kind, of_cells, count });
+                    if components == 1 && kind != "bit" {
+                        return Ok(Array { kind: self.kind(kind)?, of_cells, count });
                     }
                     self.skip(kind, count.saturating_mul(components))?;
                 }
-                ("VECTORS" | "NORMALS", Some((_, count))) => {
-                    let [_name, kind] = self.words()?;
+                ("VECTORS" | "NORMALS", Some((_, count))) => self.skip_tuples(3, count)?,
+                ("TENSORS", Some((_, count))) => self.skip_tuples(9, count)?,
+                ("TENSORS6", Some((_, count))) => self.skip_tuples(6, count)?,
+                ("GLOBAL_IDS" | "PEDIGREE_IDS", Some((_, count))) => self.skip_tuples(1, count)?,
+                (name @ "TEXTURE_COORDINATES", Some((_, count))) => {
+                    let [_name, components, kind] = self.words()?;
+                    let components = self.number(name, &components)?;
                     self.begin_samples()?;
-                    let kind = self.kind(&kind)?;
-                    self.skip(kind, count.saturating_mul(3))?;
+                    self.skip(&kind, count.saturating_mul(components))?;
+                }
+                // Bytes, or as text fractions of 255.
+                (name @ "COLOR_SCALARS", Some((_, count))) => {
+                    let [_name, components] = self.words()?;
+                    let components = self.number(name, &components)?;
+                    self.begin_samples()?;
+                    self.skip("unsigned_char", count.saturating_mul(components))?;
+                }
+                // The same for red, green, blue and A of each entry.
+                (name @ "LOOKUP_TABLE", _) => {
+                    let [_name, entries] = self.words()?;
+                    let entries = self.number(name, &entries)?;
+                    self.begin_samples()?;
+                    self.skip("unsigned_char", entries.saturating_mul(4))?;
                 }
                 ("FIELD", _) => {
                     let [_name, arrays] = self.words()?;
@@ -214,12 +232,13 @@ impl Header {
             }
             let [components, tuples, kind] = self.words()?;
             let (components, tuples) = (self.number(&name, &components)?, self.number(&name, &tuples)?);
-            let kind = self.kind(&kind)?;
             self.begin_samples()?;
-            if let Some((of_cells, count)) = section.filter(|&(_, count)| (components, tuples) == (1, count)) {
-                return Ok(Some(Array { kind, of_cells, count }));
+            let is_wanted = |&(_, count): &(bool, u64)| (components, tuples) == (1, count);
+            let is_number = !["bit", "string", "variant"].contains(&kind.to_ascii_lowercase().as_str());
+            if let Some((of_cells, count)) = section.filter(is_wanted).filter(|_| is_number) {
+                return Ok(Some(Array { kind: self.kind(&kind)?, of_cells, count }));
             }
-            self.skip(kind, components.saturating_mul(tuples))?;
+            self.skip(&kind, components.saturating_mul(tuples))?;
             found += 1;
         }
         Ok(None)
@@ -252,13 +271,24 @@ impl Header {
         })
     }
 
-    /// Skips `samples` samples.
-    fn skip(&mut self, kind: SampleType, samples: u64) -> Result<(), VolumeError> {
+    /// Skips an array of which a name and a type are stated, with as many numbers for each of `count` points or cells.
+    fn skip_tuples(&mut self, numbers: u64, count: u64) -> Result<(), VolumeError> {
+        let [_name, kind] = self.words()?;
+        self.begin_samples()?;
+        self.skip(&kind, count.saturating_mul(numbers))
+    }
+
+    /// Skips `samples` samples of the type with a name. Eight bits are a byte, and a string as text is a word.
+    fn skip(&mut self, kind: &str, samples: u64) -> Result<(), VolumeError> {
+        let bytes = match kind.to_ascii_lowercase().as_str() {
+            "bit" => samples.div_ceil(8),
+            "string" if self.is_text => 0,
+            _ => samples.saturating_mul(self.kind(kind)?.bytes()),
+        };
         let path = &self.file.path;
         let skipped = if self.is_text {
             skip_words(&mut self.file.reader, samples)
         } else {
-            let bytes = samples.saturating_mul(kind.bytes());
             io::copy(&mut self.file.reader.by_ref().take(bytes), &mut io::sink()).map(|skipped| skipped == bytes)
         };
         match skipped.map_err(io_error(path))? {

@@ -29,6 +29,7 @@ mod refused;
 #[cfg(feature = "http")]
 #[path = "../../../../tests/common/http.rs"]
 mod server;
+mod rounding;
 mod several;
 #[path = "../../../../tests/common/shared.rs"]
 mod shared;

@@ -192,6 +192,47 @@ fn legacy_headers_are_of_keywords() {
     }
 }
 
+/// Arrays before the first one with one component are skipped by their sizes, which VTK's format of files states.
+#[test]
+fn legacy_arrays_before_the_samples() {
+    let folder = Folder::new();
+    let arrays = [
+        ("TENSORS t float\n", 9 * 60, 4),
+        ("TENSORS6 t double\n", 6 * 60, 8),
+        ("TEXTURE_COORDINATES t 2 float\n", 2 * 60, 4),
+        ("COLOR_SCALARS c 3\n", 3 * 60, 1),
+        ("LOOKUP_TABLE l 7\n", 4 * 7, 1),
+        ("NORMALS n float\n", 3 * 60, 4),
+        ("GLOBAL_IDS i long\n", 60, 8),
+        ("FIELD f 2\na 2 60 short\n", 2 * 60, 2),
+    ];
+    for (array, numbers, bytes) in arrays {
+        let more = |numbers: usize| "1 ".repeat(numbers);
+        let field = if array.starts_with("FIELD") { "b 1 9 int\n1 2 3 4 5 6 7 8 9\n" } else { "" };
+        let text = |numbers: usize| format!("POINT_DATA 60\n{array}{}\n{field}", more(numbers));
+        let open = |numbers| folder.open("a.vtk", &replaced("text.vtk", "POINT_DATA 60\n", &text(numbers)));
+        assert_eq!(open(numbers).unwrap().values(), values(), "{array}");
+        for wrong in [numbers - 1, numbers + 1] {
+            assert!(matches!(open(wrong), Err(VolumeError::Invalid { .. })), "{array}");
+        }
+        // Bytes that would be keywords if they were text.
+        let field = if array.starts_with("FIELD") { [&b"b 1 9 int\n"[..], &[b'S'; 36]].concat() } else { Vec::new() };
+        let whole = fs::read(fixture("binary.vtk")).unwrap();
+        let at = whole.windows(14).position(|window| window == b"POINT_DATA 60\n").unwrap() + 14;
+        let with = |length: usize| {
+            [&whole[..at], array.as_bytes(), &b"SCALARS x ".repeat(1000)[..length], b"\n", &field, &whole[at..]].concat()
+        };
+        assert_eq!(folder.open("a.vtk", &with(numbers * bytes)).unwrap().values(), values(), "{array}");
+    }
+    // Bits take an eighth of a byte, and strings as text are words.
+    let bits = "POINT_DATA 60\nSCALARS mask bit\nLOOKUP_TABLE default\n".to_owned() + &"0 1 ".repeat(30) + "\n";
+    assert_eq!(folder.open("a.vtk", &replaced("text.vtk", "POINT_DATA 60\n", &bits)).unwrap().values(), values());
+    let names = "POINT_DATA 60\nFIELD f 1\nnames 1 60 string\n".to_owned() + &"a%20b\n".repeat(60);
+    assert_eq!(folder.open("a.vtk", &replaced("text.vtk", "POINT_DATA 60\n", &names)).unwrap().values(), values());
+    let unknown = "POINT_DATA 60\nTENSORS t half\n";
+    refused("text.vtk", "POINT_DATA 60\n", unknown, "type", "half", "char, signed_char");
+}
+
 /// Points may start at any number, but not count down.
 #[test]
 fn extents_may_begin_below_0() {
