@@ -9,6 +9,8 @@ use std::string::FromUtf8Error;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use glam::DVec3;
+
 use super::VolumeError;
 use super::address;
 use super::error::volume::{invalid, io_error};
@@ -145,7 +147,7 @@ impl ReadOptions {
 
 /// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
 #[derive(Clone)]
-pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>, Option<Arc<str>>);
+pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>, Option<Arc<str>>, Option<DVec3>);
 
 struct Inner {
     given: Option<Files>,
@@ -187,13 +189,14 @@ impl Access {
             Selection { channel: options.channel, time: options.time, level: options.level },
             None,
             options.series.as_deref().map(Arc::from),
+            None,
         ))
     }
 
     /// The same access for readers that only note where samples are, and read none.
     pub(super) fn noting(&self) -> (Self, Arc<Notes>) {
         let notes = Arc::new(Notes::default());
-        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes)), self.3.clone()), notes)
+        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes)), self.3.clone(), self.4), notes)
     }
 
     /// Whether readers note where samples are, and read none.
@@ -237,7 +240,7 @@ impl Access {
     /// The same access to files of one volume, at a level.
     #[doc(hidden)]
     pub fn whole_at(&self, level: u32) -> Self {
-        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None, None)
+        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None, None, None)
     }
 
     /// The same access to other volumes of a file. What the options select goes before it.
@@ -245,14 +248,25 @@ impl Access {
     pub fn selecting(&self, other: Selection) -> Self {
         let Selection { channel, time, level } = self.1;
         let (channel, time, level) = (channel.or(other.channel), time.or(other.time), level.or(other.level));
-        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone(), self.3.clone())
+        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone(), self.3.clone(), self.4)
     }
 
     /// The same access to a series of a folder. The one that the options choose goes before it.
     #[doc(hidden)]
     pub fn of_series(&self, series: Option<&str>) -> Self {
         let series = self.3.clone().or_else(|| series.map(Arc::from));
-        Self(Arc::clone(&self.0), self.1, self.2.clone(), series)
+        Self(Arc::clone(&self.0), self.1, self.2.clone(), series, self.4)
+    }
+
+    /// The same access to a file in place of whose spacing the scene states another.
+    #[doc(hidden)]
+    pub fn of_spacing(&self, spacing: Option<DVec3>) -> Self {
+        Self(Arc::clone(&self.0), self.1, self.2.clone(), self.3.clone(), spacing)
+    }
+
+    /// The spacing that the scene states in place of the file's.
+    pub(super) fn spacing(&self) -> Option<DVec3> {
+        self.4
     }
 
     /// The series that is read of a folder with several; `None` for the largest.

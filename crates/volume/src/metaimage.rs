@@ -20,7 +20,7 @@ use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::source::{MAX_HEADER, Source};
 use super::stream::Stream;
 use super::text::{number, shown};
-use super::unit::unit;
+use super::unit::{self, unit};
 use super::voxel::Voxel;
 
 /// Reads one MetaImage file, or the header and the data file it names.
@@ -152,11 +152,10 @@ impl Header {
 
     fn spacing(&self) -> Result<Option<DVec3>, VolumeError> {
         let Some((name, spacing)) = self.in_space(&["ElementSpacing", "ElementSize"])? else { return Ok(None) };
-        if spacing.min_element() <= 0.0 {
-            let found = format!("{:?}", spacing.to_array());
-            return Err(self.0.invalid(&name, found, "three positive finite numbers"));
-        }
-        Ok(Some(spacing))
+        let spacing = spacing.to_array();
+        unit::known((&self.0.path, &name), spacing).map(Some).ok_or_else(|| {
+            self.0.invalid(&name, format!("{spacing:?}"), "three positive finite numbers, or 0")
+        })
     }
 
     /// The orientation; each row of the matrix is an axis of the volume, of which that of times is not looked at.

@@ -23,7 +23,7 @@ use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
 use super::source::{MAX_HEADER, Source};
 use super::stream::Stream;
-use super::text::{lower, number, shown, three, vector};
+use super::text::{lower, shown, three, vector};
 use super::unit;
 use super::voxel::Voxel;
 
@@ -36,7 +36,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let header = Header::read(&mut file)?;
     let axes = header.axes()?;
     let dims = header.dims(&axes)?;
-    let (lattice, orientation) = header.lattice_and_orientation(&axes)?;
+    let (lattice, orientation, unit) = header.lattice_and_orientation(&axes)?;
     let layout = header.layout(dims, axes.series)?;
     let values = match header.data_files()? {
         Some(files) if axes.series.count() > 1 && files.count() > 1 => {
@@ -46,7 +46,6 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
             .read::<T>(path, "data file", &layout.samples, access, |file, samples| layout.read::<T>(file, samples))?,
         None => layout.read::<T>(file, &layout.samples)?,
     };
-    let unit = header.unit();
     let loaded = Loaded::new(dims, layout.samples.kind, values);
     let spacing = lattice.map(|lattice| lattice.spacing);
     let series = axes.series;
@@ -206,18 +205,28 @@ impl Header {
         })
     }
 
-    fn lattice_and_orientation(&self, axes: &Axes) -> Result<(Option<Lattice>, Option<Orientation>), VolumeError> {
+    fn lattice_and_orientation(
+        &self,
+        axes: &Axes,
+    ) -> Result<(Option<Lattice>, Option<Orientation>, Option<String>), VolumeError> {
         match (self.0.get("spacings"), self.0.get(DIRECTIONS)) {
-            (None, None) => Ok((None, None)),
+            (None, None) => Ok((None, None, self.unit(axes, DVec3::ONE).0)),
             (None, Some(_)) => {
-                let lattice = self.directions(axes)?;
-                Ok((Some(lattice), self.orientation(lattice.axes)?))
+                let vectors = self.directions(axes)?;
+                let along = |axis: usize| vectors.iter().map(|vector| vector[axis].abs()).fold(0.0, f64::max);
+                let (unit, factors) = self.unit(axes, DVec3::new(along(0), along(1), along(2)));
+                let lattice = Lattice::of(vectors.map(|vector| factors * vector));
+                let lattice = lattice.map_err(|found| self.0.invalid(DIRECTIONS, found, shear::allowed()))?;
+                Ok((Some(lattice), self.orientation(lattice.axes, factors)?, unit))
             }
-            (Some(_), None) => self.0.value("spacings", "three positive finite numbers", |text| {
-                let spacings = three(axes.in_space(text?.split_whitespace()).map(number))?;
-                let lattice = Lattice::straight(DVec3::from_array(spacings), DMat3::IDENTITY);
-                spacings.iter().all(|&spacing| spacing > 0.0).then_some((Some(lattice), None))
-            }),
+            (Some(_), None) => {
+                let spacings = self.0.value("spacings", "three positive finite numbers, or 0 or NaN", |text| {
+                    let spacings = three(axes.in_space(text?.split_whitespace()).map(|word| word.parse().ok()))?;
+                    unit::known((&self.0.path, "spacings"), spacings)
+                })?;
+                let (unit, factors) = self.unit(axes, spacings);
+                Ok((Some(Lattice::straight(factors * spacings, DMat3::IDENTITY)), None, unit))
+            }
             (Some(_), Some(_)) => {
                 let allowed = "one of `spacings` and `space directions`";
                 Err(self.0.invalid(DIRECTIONS, "`spacings` as well", allowed))
@@ -225,10 +234,19 @@ impl Header {
         }
     }
 
-    /// The unit that all axes share, from the space or else from the array: three quoted names.
-    fn unit(&self) -> Option<String> {
-        let names = self.0.get("space units").or(self.0.get("units"))?.split('"').skip(1).step_by(2);
-        unit::common(names)
+    /// The unit, and the factors of lengths along the axes of space, or of the array: quoted names.
+    fn unit(&self, axes: &Axes, spacing: DVec3) -> (Option<String>, DVec3) {
+        let quoted = |text: &'_ str| text.split('"').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
+        let (field, names) = match (self.0.get("space units").map(quoted), self.0.get("units").map(quoted)) {
+            (Some(names), _) => ("space units", names),
+            (None, Some(names)) if names.len() == 3 => ("units", names),
+            (None, Some(names)) => ("units", axes.in_space(names.iter().map(String::as_str)).map(str::to_owned).collect()),
+            (None, None) => return (None, DVec3::ONE),
+        };
+        match names.as_slice() {
+            [x, y, z] => unit::shared((&self.0.path, field), spacing, [x, y, z].map(|name| Some(name.as_str()))),
+            _ => (None, DVec3::ONE),
+        }
     }
 
     /// The unit of the values.
@@ -273,22 +291,21 @@ impl Header {
         })
     }
 
-    /// The lattice that `space directions` gives.
-    fn directions(&self, of: &Axes) -> Result<Lattice, VolumeError> {
+    /// The vectors of `space directions`.
+    fn directions(&self, of: &Axes) -> Result<[DVec3; 3], VolumeError> {
         let allowed = "three vectors (x,y,z) of positive finite length, none of them `none`";
-        let axes = self.0.value(DIRECTIONS, allowed, |text| {
+        self.0.value(DIRECTIONS, allowed, |text| {
             // That of an axis which is not in space is `none`.
             let text = lower(text?);
             let words: Vec<&str> = without(vector_words(&text).into_iter(), of.left_out).collect();
             let is_there = of.other.is_none_or(|other| words.get(other) == Some(&"none"));
             let axes = three(without(words.into_iter(), of.other).map(vector)).filter(|_| is_there)?;
             axes.iter().all(|axis| axis.length() > 0.0 && axis.length().is_finite()).then_some(axes)
-        })?;
-        Lattice::of(axes).map_err(|found| self.0.invalid(DIRECTIONS, found, shear::allowed()))
+        })
     }
 
     /// The orientation for axes with these directions; `None` in a space that is not a patient's.
-    fn orientation(&self, axes: DMat3) -> Result<Option<Orientation>, VolumeError> {
+    fn orientation(&self, axes: DMat3, factors: DVec3) -> Result<Option<Orientation>, VolumeError> {
         let ras_from_space = match self.0.get("space").map(lower).as_deref() {
             Some("right-anterior-superior" | "ras") => DVec3::ONE,
             Some("left-anterior-superior" | "las") => DVec3::new(-1.0, 1.0, 1.0),
@@ -297,7 +314,7 @@ impl Header {
         };
         let origin = self.0.value("space origin", "a vector (x,y,z)", |text| text.map_or(Some(DVec3::ZERO), vector))?;
         let axes = DMat3::from_diagonal(ras_from_space) * axes;
-        Ok(Some(Orientation { axes, origin: ras_from_space * origin }))
+        Ok(Some(Orientation { axes, origin: ras_from_space * factors * origin }))
     }
 
     /// The data files; `None` if the samples are in the header's own file.

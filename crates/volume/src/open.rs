@@ -18,7 +18,7 @@ impl Volume {
     /// Reads a volume file. Its first bytes determine the format, or else its extension: NRRD (`.nrrd`, `.nhdr`), and, each with the
     /// feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MGH (`.mgh`, `.mgz`), MetaImage (`.mha`, `.mhd`), NPY
     /// (`.npy`) and its archives (`.npz`: their only array, or the one named as in `file.npz:name`), TIFF (`.tif`, `.tiff`), DICOM
-    /// (`.dcm`), VTK (`.vti`, `.vtk`) and Zarr (folders, and archives `.zip` and `.ozx`). The path may also be a folder of slices: TIFF files of one page,
+    /// (`.dcm`), VTK (`.vti`, `.vtr`, `.vtk`) and Zarr (folders, and archives `.zip` and `.ozx`). The path may also be a folder of slices: TIFF files of one page,
     /// or DICOM files, of whose series the largest is read, or that of [`ReadOptions::series`].
     ///
     /// # Errors
@@ -46,7 +46,7 @@ impl Volume {
         let mut facts = facts.into_iter();
         let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();
-        let spacing = spacing.unwrap_or(DVec3::ONE);
+        let spacing = access.spacing().or(spacing).unwrap_or(DVec3::ONE);
         access.take_rounding().warn(path, sample_type, values.as_slice());
         if series.is_color {
             let bytes = COLOR_BYTES * u64::from(dims.element_product());
@@ -68,6 +68,7 @@ impl Volume {
         let mut first = channel(values)?;
         let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
         if let Some(Levels { dims, level, grid, reads }) = levels {
+            let grid = access.spacing().map_or(grid, |spacing| grid.with_finest_spacing(spacing));
             grid.check().map_err(|error| refused(&origin, error))?;
             (first.grid, first.levels, first.level, first.reads) = (grid, dims, level, Some(reads));
         }

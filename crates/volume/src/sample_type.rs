@@ -113,6 +113,22 @@ impl SampleType {
         }
     }
 
+    /// The numbers of which `bytes` are a whole number of samples.
+    #[cfg(feature = "vtk")]
+    pub(super) fn numbers(self, bytes: &[u8], big_endian: bool) -> Vec<f64> {
+        let ordered = |sample: &[u8]| {
+            let mut sample = sample.to_vec();
+            if big_endian {
+                sample.reverse();
+            }
+            sample
+        };
+        let bytes: Vec<u8> = bytes.chunks_exact(self.bytes() as usize).flat_map(ordered).collect();
+        for_sample_type!(self, Number => {
+            bytes.as_chunks().0.iter().map(|&sample| Number::from_le_bytes(sample).to_f64()).collect()
+        })
+    }
+
     /// Appends the bytes, in the machine's order, of a sample written as text.
     pub(super) fn parse(self, text: &str, into: &mut Vec<u8>) -> Option<()> {
         for_sample_type!(self, Number => into.extend(text.parse::<Number>().ok()?.to_ne_bytes()));

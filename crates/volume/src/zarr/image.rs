@@ -149,7 +149,7 @@ impl Image {
         if all.len() > 1 {
             log::warn!("{}: {} multiscale images: the first is read", node.file.display(), all.len());
         }
-        let multiscale = Multiscale::read(multiscale)?;
+        let multiscale = Multiscale::read(&keys.path, multiscale)?;
         if multiscale.datasets.len() > MAX_LEVELS {
             let found = format!("{} levels", multiscale.datasets.len());
             return Err(invalid(&node.file, "datasets", found, format!("at most {MAX_LEVELS}")));

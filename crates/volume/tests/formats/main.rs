@@ -36,6 +36,7 @@ mod shared;
 mod shear;
 mod tiff;
 mod tiff_planes;
+mod units;
 mod values;
 mod vtk;
 mod zarr;

@@ -110,7 +110,7 @@ fn wrong_fields() {
         ("LOCAL", "slice%s.raw 1 3 1", "ElementDataFile", "%s", "a pattern with one %d"),
         ("LOCAL", "", "ElementDataFile", "", "LOCAL, the name of one file"),
         ("NDims", "CompressedData = maybe\nNDims", "CompressedData", "maybe", "True or False"),
-        ("NDims", "ElementSpacing = 1 0 1\nNDims", "ElementSpacing", "[1.0, 0.0, 1.0]", "positive"),
+        ("NDims", "ElementSpacing = 1 -1 1\nNDims", "ElementSpacing", "[1.0, -1.0, 1.0]", "positive"),
         ("NDims", "ElementSpacing = 1 nan 1\nNDims", "ElementSpacing", "1 nan 1", "3 of them"),
         ("NDims", "TransformMatrix = 1 0 0 0 1 0\nNDims", "TransformMatrix", "1 0 0 0 1 0", "9 of them"),
         ("NDims", "TransformMatrix = 1 0 0 0.5 1 0 0 0 1\nNDims", "TransformMatrix", "not orthogonal", "orthogonal"),
