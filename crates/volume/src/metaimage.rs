@@ -153,9 +153,9 @@ impl Header {
     fn spacing(&self) -> Result<Option<DVec3>, VolumeError> {
         let Some((name, spacing)) = self.in_space(&["ElementSpacing", "ElementSize"])? else { return Ok(None) };
         let spacing = spacing.to_array();
-        unit::known((&self.0.path, &name), spacing).map(Some).ok_or_else(|| {
-            self.0.invalid(&name, format!("{spacing:?}"), "three positive finite numbers, or 0")
-        })
+        unit::known((&self.0.path, &name), spacing)
+            .map(Some)
+            .ok_or_else(|| self.0.invalid(&name, format!("{spacing:?}"), "three positive finite numbers, or 0"))
     }
 
     /// The orientation; each row of the matrix is an axis of the volume, of which that of times is not looked at.

@@ -154,7 +154,8 @@ impl Header {
         let kinds: Vec<&str> = kinds.split_whitespace().collect();
         let in_space = |kind: &str| ["domain", "space", "???", "none"].contains(&kind);
         let words = self.0.get(DIRECTIONS).or(self.0.get("spacings")).map(lower).unwrap_or_default();
-        let words: Vec<&str> = if words.contains('(') { vector_words(&words) } else { words.split_whitespace().collect() };
+        let words: Vec<&str> =
+            if words.contains('(') { vector_words(&words) } else { words.split_whitespace().collect() };
         let is_none = |word: &str| ["none", "nan"].contains(&word);
         // Of several, the last that is not in space, or else the last.
         let in_no_space = |&axis: &usize| {
@@ -240,7 +241,9 @@ impl Header {
         let (field, names) = match (self.0.get("space units").map(quoted), self.0.get("units").map(quoted)) {
             (Some(names), _) => ("space units", names),
             (None, Some(names)) if names.len() == 3 => ("units", names),
-            (None, Some(names)) => ("units", axes.in_space(names.iter().map(String::as_str)).map(str::to_owned).collect()),
+            (None, Some(names)) => {
+                ("units", axes.in_space(names.iter().map(String::as_str)).map(str::to_owned).collect())
+            }
             (None, None) => return (None, DVec3::ONE),
         };
         match names.as_slice() {
@@ -262,7 +265,11 @@ impl Header {
             let names = self.segments("_Name", layer).map(|(label, name)| (label, name.clone())).collect();
             Legend { names, palette: self.palette(layer) }
         };
-        if series.channels > 1 { (0..series.channels).map(|layer| legend(Some(layer))).collect() } else { vec![legend(None)] }
+        if series.channels > 1 {
+            (0..series.channels).map(|layer| legend(Some(layer))).collect()
+        } else {
+            vec![legend(None)]
+        }
     }
 
     /// The colours of the segments of a layer, or of all.

@@ -123,10 +123,7 @@ impl SampleType {
     }
 }
 
-fn append<S: Sample, T: Voxel>(
-    samples: impl Iterator<Item = S> + Clone,
-    into: &mut Vec<T>,
-) -> Result<Rounding, f64> {
+fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S> + Clone, into: &mut Vec<T>) -> Result<Rounding, f64> {
     if T::HOLDS_ALL {
         // Without a test of each, several are converted at a time.
         into.extend(samples.clone().map(|sample| T::of(sample).unwrap_or(T::HOLE)));

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use glam::DVec3;
 
-
 /// Synonymous names of units, the symbol first.
 const UNITS: [&[&str]; 7] = [
     &["Å", "Å", "angstrom", "angstroms"],

@@ -71,9 +71,10 @@ pub(super) fn resampled<T: Voxel>(
         loaded.values = values.map_err(|error| invalid(path, name, format!("{dims} voxels: {error}"), "fewer"))?;
         loaded.dims = UVec3::from_array(sizes);
         let step = |pair: &[f64]| pair[1] - pair[0];
-        let (least, most) = places.windows(2).map(step).fold((f64::INFINITY, 0.0_f64), |(least, most), step| {
-            (least.min(step), most.max(step))
-        });
+        let (least, most) = places
+            .windows(2)
+            .map(step)
+            .fold((f64::INFINITY, 0.0_f64), |(least, most), step| (least.min(step), most.max(step)));
         log::warn!(
             "{}: {name}: distances from {least:.4} to {most:.4}: resampled from {from} to {to} samples, {:.4} apart",
             path.display(),

@@ -26,10 +26,10 @@ mod npz;
 mod nrrd;
 mod raw;
 mod refused;
+mod rounding;
 #[cfg(feature = "http")]
 #[path = "../../../../tests/common/http.rs"]
 mod server;
-mod rounding;
 mod several;
 #[path = "../../../../tests/common/shared.rs"]
 mod shared;

@@ -47,8 +47,7 @@ fn the_largest_error_is_named_once() {
                     }
                 }
             }
-            let layout =
-                RawLayout { dims: UVec3::new(2, 1, 1), sample_type: kind, big_endian: false, offset: 0 };
+            let layout = RawLayout { dims: UVec3::new(2, 1, 1), sample_type: kind, big_endian: false, offset: 0 };
             let raw = folder.write("a.raw", &[&data]);
             let (_, warnings) = warned(|| Volume::open_raw(&raw, &layout).unwrap());
             assert_eq!(warnings.len(), usize::from(!error.is_empty()), "{warnings:?}");

@@ -111,8 +111,13 @@ fn five_axes_of_nrrd() {
     assert!(text.contains("sizes: 1 5 4 3 3"));
     assert_refused(with("1 5 4 3 3", "2 5 4 3 3"), "a.nrrd", "sizes", "[2, 5, 4, 3, 3]", "five of which one is 1");
     assert_refused(with("1 5 4 3 3", "1 5 4 3"), "a.nrrd", "sizes", "1 5 4 3", "5 positive integers");
-    assert_refused(with("none (0.5", "(1,0,0) (0.5").map(drop).and(with("(0,0,3) none", "(0,0,3) (0,0,1)")), "a.nrrd",
-        "space directions", "(0,0,1)", "three vectors");
+    assert_refused(
+        with("none (0.5", "(1,0,0) (0.5").map(drop).and(with("(0,0,3) none", "(0,0,3) (0,0,1)")),
+        "a.nrrd",
+        "space directions",
+        "(0,0,1)",
+        "three vectors",
+    );
     // Of several axes of one sample that which is not in space is left out, and of others the last.
     let flat = with("1 5 4 3 3", "1 5 12 1 3").unwrap();
     assert_eq!((flat.dims(), flat.encoding().unwrap().times), (UVec3::new(5, 12, 1), 3));

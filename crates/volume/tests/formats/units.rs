@@ -11,7 +11,7 @@ fn a_stated_spacing_is_in_place_of_the_files() {
     let folder = Folder::new();
     let header = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 1\nspacings: 1 1 99999\nencoding: raw\n\n";
     let path = folder.write("a.nrrd", &[header.as_bytes(), &[1, 2]]);
-    assert_refused(Volume::open(&path), "a.nrrd", "spacing", "99999", "at most 10000 times");
+    assert_refused(Volume::open(&path), "a.nrrd", "spacing", "99999", "none above 10000 times another");
     let access = Access::new(&ReadOptions::default()).unwrap().of_spacing(Some(SPACING));
     assert_eq!(Volume::read(&path, &access).unwrap().spacing(), SPACING);
     // Levels keep their proportion.

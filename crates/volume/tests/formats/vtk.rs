@@ -83,7 +83,13 @@ fn wrong_image_data() {
         "[0, 4, 0, 3, 0, 2]",
         "as the whole",
     );
-    refused("Spacing=\"0.5 2 3\"", "Spacing=\"0.5 -1 3\"", "Spacing", "0.5 -1 3", "three positive finite numbers, or 0");
+    refused(
+        "Spacing=\"0.5 2 3\"",
+        "Spacing=\"0.5 -1 3\"",
+        "Spacing",
+        "0.5 -1 3",
+        "three positive finite numbers, or 0",
+    );
     refused("Direction=\"0.6666", "Direction=\"0.7666", "Direction", "not orthogonal", "orthogonal axes");
     refused("Direction=\"0.6666666666666666", "Direction=\"", "Direction", "-0.33", "nine finite numbers");
     refused("<CellData>", "<Piece/><CellData>", "Piece", "more than one", "one");
@@ -220,7 +226,8 @@ fn legacy_arrays_before_the_samples() {
         let whole = fs::read(fixture("binary.vtk")).unwrap();
         let at = whole.windows(14).position(|window| window == b"POINT_DATA 60\n").unwrap() + 14;
         let with = |length: usize| {
-            [&whole[..at], array.as_bytes(), &b"SCALARS x ".repeat(1000)[..length], b"\n", &field, &whole[at..]].concat()
+            [&whole[..at], array.as_bytes(), &b"SCALARS x ".repeat(1000)[..length], b"\n", &field, &whole[at..]]
+                .concat()
         };
         assert_eq!(folder.open("a.vtk", &with(numbers * bytes)).unwrap().values(), values(), "{array}");
     }
@@ -315,7 +322,13 @@ fn wrong_rectilinear_grids() {
     legacy("-12.5", "x", "Y_COORDINATES", "\"x\"", "4 numbers of type float64");
     legacy("Y_COORDINATES 4", "Y_COORDINATES 5", "Y_COORDINATES", "Z_COORDINATES", "5 numbers of type float64");
     legacy("-16.5 -12.5", "-16.5", "Y_COORDINATES", "Z_COORDINATES", "4 numbers");
-    legacy("Y_COORDINATES 4 double\n-20.5 -18.5 -16.5 -12.5", "", "Y_COORDINATES", "0 numbers", "4, as DIMENSIONS says");
+    legacy(
+        "Y_COORDINATES 4 double\n-20.5 -18.5 -16.5 -12.5",
+        "",
+        "Y_COORDINATES",
+        "0 numbers",
+        "4, as DIMENSIONS says",
+    );
     legacy("DIMENSIONS 5 4 3", "DIMENSIONS 4 5 3", "X_COORDINATES", "5 numbers", "4, as DIMENSIONS says");
     legacy("double\n-20.5", "half\n-20.5", "type", "half", "char, signed_char");
     legacy("RECTILINEAR_GRID", "STRUCTURED_GRID", "header", "DATASET STRUCTURED_GRID", "RECTILINEAR_GRID");

@@ -12,9 +12,7 @@ fn spacings() {
     let open = |line: &str| folder.attached(&format!("{PLAIN}{line}\n"), &bytes());
     assert_eq!(open("spacings: 1 0.5e-3\t+2.").unwrap().spacing(), DVec3::new(1.0, 0.5e-3, 2.0));
     let allowed = "three positive finite numbers";
-    for wrong in
-        ["1 1", "1 1 1 1", "1 1 inf", "1 -1 1", "0 -1 1", "1 1 x", "", "1,1,1", "1 1 1e400"]
-    {
+    for wrong in ["1 1", "1 1 1 1", "1 1 inf", "1 -1 1", "0 -1 1", "1 1 x", "", "1,1,1", "1 1 1e400"] {
         assert_refused(open(&format!("spacings: {wrong}")), "volume.nrrd", "spacings", wrong, allowed);
     }
 }
