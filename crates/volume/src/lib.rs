@@ -75,7 +75,7 @@ mod texel;
 mod text;
 #[cfg(feature = "tiff")]
 mod tiff;
-#[cfg(feature = "dicom")]
+#[cfg(any(feature = "dicom", feature = "vtk"))]
 mod uneven;
 mod unit;
 mod value_slice;

@@ -20,7 +20,7 @@ use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::source::{MAX_HEADER, Source};
 use super::stream::Stream;
 use super::text::{number, shown};
-use super::unit::{self, unit};
+use super::unit::{self, NON_UNIFORM, unit, warn_of_itk};
 use super::voxel::Voxel;
 
 /// Reads one MetaImage file, or the header and the data file it names.
@@ -48,6 +48,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     };
     let Samples { dims, kind, .. } = samples;
     let unit = header.0.get("DistanceUnits").and_then(unit);
+    warn_of_itk(path, header.0.get(NON_UNIFORM));
     let loaded = Loaded::new(dims, kind, values);
     Ok(Loaded { spacing, unit, orientation, series, ..loaded })
 }

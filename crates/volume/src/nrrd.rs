@@ -24,7 +24,7 @@ use super::shear::{self, Lattice};
 use super::source::{MAX_HEADER, Source};
 use super::stream::Stream;
 use super::text::{lower, shown, three, vector};
-use super::unit;
+use super::unit::{self, NON_UNIFORM, warn_of_itk};
 use super::voxel::Voxel;
 
 /// The field with the axes, which need not be at right angles.
@@ -36,7 +36,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let header = Header::read(&mut file)?;
     let axes = header.axes()?;
     let dims = header.dims(&axes)?;
-    let (lattice, orientation, unit) = header.lattice_and_orientation(&axes)?;
+    let Place { lattice, orientation, unit } = header.place(&axes)?;
     let layout = header.layout(dims, axes.series)?;
     let values = match header.data_files()? {
         Some(files) if axes.series.count() > 1 && files.count() > 1 => {
@@ -50,6 +50,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let spacing = lattice.map(|lattice| lattice.spacing);
     let series = axes.series;
     let legends = header.legends(series);
+    warn_of_itk(path, header.1.get(NON_UNIFORM).map(String::as_str));
     let value_unit = header.value_unit();
     let loaded = Loaded { spacing, unit, value_unit, orientation, legends, series, ..loaded };
     match lattice {
@@ -72,6 +73,13 @@ impl Axes {
     fn in_space<'a>(&self, words: impl Iterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
         without(without(words, self.left_out), self.other)
     }
+}
+
+/// Where the voxels lie, as far as a file states it.
+struct Place {
+    lattice: Option<Lattice>,
+    orientation: Option<Orientation>,
+    unit: Option<String>,
 }
 
 /// The words about all axes but one.
@@ -206,19 +214,17 @@ impl Header {
         })
     }
 
-    fn lattice_and_orientation(
-        &self,
-        axes: &Axes,
-    ) -> Result<(Option<Lattice>, Option<Orientation>, Option<String>), VolumeError> {
+    fn place(&self, axes: &Axes) -> Result<Place, VolumeError> {
         match (self.0.get("spacings"), self.0.get(DIRECTIONS)) {
-            (None, None) => Ok((None, None, self.unit(axes, DVec3::ONE).0)),
+            (None, None) => Ok(Place { lattice: None, orientation: None, unit: self.unit(axes, DVec3::ONE).0 }),
             (None, Some(_)) => {
                 let vectors = self.directions(axes)?;
                 let along = |axis: usize| vectors.iter().map(|vector| vector[axis].abs()).fold(0.0, f64::max);
                 let (unit, factors) = self.unit(axes, DVec3::new(along(0), along(1), along(2)));
                 let lattice = Lattice::of(vectors.map(|vector| factors * vector));
                 let lattice = lattice.map_err(|found| self.0.invalid(DIRECTIONS, found, shear::allowed()))?;
-                Ok((Some(lattice), self.orientation(lattice.axes, factors)?, unit))
+                let orientation = self.orientation(lattice.axes, factors)?;
+                Ok(Place { lattice: Some(lattice), orientation, unit })
             }
             (Some(_), None) => {
                 let spacings = self.0.value("spacings", "three positive finite numbers, or 0 or NaN", |text| {
@@ -226,7 +232,8 @@ impl Header {
                     unit::known((&self.0.path, "spacings"), spacings)
                 })?;
                 let (unit, factors) = self.unit(axes, spacings);
-                Ok((Some(Lattice::straight(factors * spacings, DMat3::IDENTITY)), None, unit))
+                let lattice = Some(Lattice::straight(factors * spacings, DMat3::IDENTITY));
+                Ok(Place { lattice, orientation: None, unit })
             }
             (Some(_), Some(_)) => {
                 let allowed = "one of `spacings` and `space directions`";

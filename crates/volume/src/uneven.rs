@@ -56,6 +56,7 @@ impl Even {
     }
 
     /// The places, each moved to the nearest sample.
+    #[cfg(feature = "dicom")]
     pub(super) fn nearest(self) -> Self {
         let places = self.places.into_iter().map(|(at, part)| (at + usize::from(part >= 0.5), 0.0)).collect();
         Self { places, ..self }

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
+use super::text::shown;
+
 /// Synonymous names of units, the symbol first.
 const UNITS: [&[&str]; 7] = [
     &["Å", "Å", "angstrom", "angstroms"],
@@ -37,11 +39,11 @@ pub(super) fn shared(
     names: [Option<&str>; 3],
 ) -> (Option<String>, DVec3) {
     let units = names.map(|name| name.and_then(unit));
-    let shown = || names.iter().flatten().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
+    let all = || names.iter().flatten().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
     let Some(first) = units.iter().flatten().next() else { return (None, DVec3::ONE) };
     if units.iter().flatten().all(|unit| unit == first) {
         if units.iter().flatten().count() < names.iter().flatten().count() {
-            log::warn!("{}: {field}: {}: an axis without a unit is taken to be in {first}", path.display(), shown());
+            log::warn!("{}: {field}: {}: an axis without a unit is taken to be in {first}", path.display(), all());
         }
         return (Some(first.clone()), DVec3::ONE);
     }
@@ -50,7 +52,7 @@ pub(super) fn shared(
         UNITS.iter().position(|names| names[0] == unit).map(|at| Some(METERS[at]))
     });
     let [Some(x), Some(y), Some(z)] = meters else {
-        log::warn!("{}: {field}: {}: not all are lengths, so that no unit is taken", path.display(), shown());
+        log::warn!("{}: {field}: {}: not all are lengths, so that no unit is taken", path.display(), all());
         return (None, DVec3::ONE);
     };
     let meters = [x, y, z];
@@ -58,7 +60,7 @@ pub(super) fn shared(
     let finest = [0, 1, 2].into_iter().min_by(|a, b| length(a).total_cmp(&length(b))).unwrap_or_default();
     let unit = units[finest].clone();
     let name = unit.as_deref().unwrap_or_default();
-    log::warn!("{}: {field}: {}: lengths are converted to {name}, the finest axis' unit", path.display(), shown());
+    log::warn!("{}: {field}: {}: lengths are converted to {name}, the finest axis' unit", path.display(), all());
     let to = meters[finest].unwrap_or(1.0);
     (unit, DVec3::from_array(meters.map(|meters| meters.map_or(1.0, |meters| meters / to))))
 }
@@ -76,6 +78,19 @@ pub(super) fn known((path, field): (&Path, &str), spacings: [f64; 3]) -> Option<
         log::warn!("{}: {field}: {spacings:?}: an axis without a spacing is taken to have {finest}", path.display());
     }
     Some(DVec3::from_array(spacings.map(|spacing| if is_known(&spacing) { spacing } else { finest })))
+}
+
+/// The entry by which ITK says that the slices of the series that it made a file of were not evenly spaced.
+pub(super) const NON_UNIFORM: &str = "ITK_non_uniform_sampling_deviation";
+
+/// Warns of what such an entry says. Where the slices lay, such files do not say.
+pub(super) fn warn_of_itk(path: &Path, deviation: Option<&str>) {
+    if let Some(deviation) = deviation {
+        let (path, deviation) = (path.display(), shown(deviation));
+        log::warn!(
+            "{path}: {NON_UNIFORM}: {deviation}: its slices were not evenly spaced, and it does not say how: read the series itself"
+        );
+    }
 }
 
 #[cfg(test)]

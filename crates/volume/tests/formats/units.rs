@@ -57,6 +57,20 @@ fn units_of_ome_zarr() {
     assert!(warnings.is_empty(), "{warnings:?}");
 }
 
+/// ITK notes that the series which it made a file of had uneven slices (`itk::ImageSeriesReader`), of which the file lacks the places.
+#[test]
+fn uneven_slices_of_itk() {
+    let folder = Folder::new();
+    let nrrd = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 2 1 1\nencoding: raw\nITK_non_uniform_sampling_deviation:=1.5\n\n\x01\x02";
+    let meta = "ObjectType = Image\nNDims = 3\nBinaryData = True\nITK_non_uniform_sampling_deviation = 1.5\nDimSize = 2 1 1\n\
+                ElementType = MET_UCHAR\nElementDataFile = LOCAL\n\x01\x02";
+    for (name, file) in [("a.nrrd", nrrd), ("a.mha", meta)] {
+        let (volume, warnings) = warned(|| folder.open(name, file.as_bytes()).unwrap());
+        assert_eq!(volume.values(), [1.0, 2.0], "{name}");
+        assert_warned(&warnings, "ITK_non_uniform_sampling_deviation: \"1.5\": its slices were not evenly spaced");
+    }
+}
+
 /// Of MetaImage and VTK an axis without a spacing has the finest of the others, as of NRRD and OME-TIFF.
 #[test]
 fn axes_without_a_spacing() {
