@@ -3,14 +3,17 @@
 use std::num::ParseFloatError;
 use std::str::FromStr;
 
-use super::sample_type::Sample;
-
 /// A number of 16 bits by IEEE 754: a sign, an exponent of 5 bits and a fraction of 10.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Half(u16);
 
 impl Half {
     pub(super) const MAX: Self = Self(0x7bff);
+
+    /// The `f32` that equals it.
+    pub(super) fn value(self) -> f32 {
+        value(self.0)
+    }
 
     pub(super) fn from_le_bytes(bytes: [u8; 2]) -> Self {
         Self(u16::from_le_bytes(bytes))
@@ -32,24 +35,6 @@ impl FromStr for Half {
 
     fn from_str(text: &str) -> Result<Self, ParseFloatError> {
         text.parse().map(|number| Self(of(number)))
-    }
-}
-
-/// Every one is an `f32`.
-impl Sample for Half {
-    const IS_WHOLE: bool = false;
-    const MAY_ROUND: bool = false;
-
-    fn to_f32(self) -> f32 {
-        value(self.0)
-    }
-
-    fn to_f64(self) -> f64 {
-        value(self.0).into()
-    }
-
-    fn error_if_whole(self) -> f64 {
-        0.0
     }
 }
 

@@ -82,6 +82,24 @@ sample_types!(
 );
 primitive_samples!(i8, u8, i16, u16, i32, u32, i64, u64, f32, f64);
 
+/// Every one is an `f32`.
+impl Sample for crate::half::Half {
+    const IS_WHOLE: bool = false;
+    const MAY_ROUND: bool = false;
+
+    fn to_f32(self) -> f32 {
+        self.value()
+    }
+
+    fn to_f64(self) -> f64 {
+        self.value().into()
+    }
+
+    fn error_if_whole(self) -> f64 {
+        0.0
+    }
+}
+
 /// Evaluates an expression in which a name stands for the type of a [`SampleType`]. It is compiled for each type.
 macro_rules! for_sample_type {
     (@ $kind:expr, $type:ident => $result:expr; $($name:ident: $of:ty),*) => {

@@ -6,7 +6,6 @@ use std::path::Path;
 
 use glam::{DVec3, UVec3, Vec3Swizzles};
 
-use super::access::Access;
 use super::error::volume::{VolumeError, invalid};
 use super::grid::Grid;
 use super::rounding::Rounding;
@@ -59,20 +58,21 @@ impl Samples {
         Ok(sorted)
     }
 
-    /// Converts all of `bytes` and appends the voxels to `into`, which holds those before.
+    /// Converts all of `bytes` and appends the voxels to `into`, which holds those before. Returns what they lose.
     pub(super) fn append<T: Voxel>(
         &self,
-        (path, access): (&Path, &Access),
+        path: &Path,
         bytes: &[u8],
         into: &mut T::Many,
-    ) -> Result<(), VolumeError> {
+    ) -> Result<Rounding, VolumeError> {
+        let mut rounding = Rounding::default();
         let mut voxels = Vec::new();
         for bytes in bytes.chunks(BLOCK * self.kind.bytes() as usize) {
             voxels.clear();
-            access.note_rounding(self.convert::<T>(path, bytes, &mut voxels, into.count())?);
+            rounding = rounding.max(self.convert::<T>(path, bytes, &mut voxels, into.count())?);
             into.append(&voxels).map_err(self.too_many(path))?;
         }
-        Ok(())
+        Ok(rounding)
     }
 
     /// Converts all of `bytes` and appends the voxels to `into`, in front of which there are some others. Returns what they lose.

@@ -103,7 +103,7 @@ fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Lo
                 let big_endian = cfg!(target_endian = "big");
                 let samples =
                     Samples { kind: image.kind(), dims, big_endian, rescale: rescale_of(slice), z_fastest: false };
-                samples.append::<T>((&image.path, access), &frame?, &mut values)?;
+                access.note_rounding(samples.append::<T>(&image.path, &frame?, &mut values)?);
             }
         }
     }

@@ -224,7 +224,8 @@ impl<'a, T: Voxel> Slices<'a, T> {
         self.samples(1)?.reserve::<T>(&pages.path, access)?;
         let bytes = pages.bytes()?;
         self.channels[channel].slices.push(slice);
-        samples.append::<T>((&pages.path, access), &bytes, &mut self.channels[channel].values)
+        access.note_rounding(samples.append::<T>(&pages.path, &bytes, &mut self.channels[channel].values)?);
+        Ok(())
     }
 
     fn finish(mut self, calibration: &Calibration) -> Result<Loaded<T>, VolumeError> {
