@@ -143,6 +143,7 @@ fn single(count: usize, number: usize, settings: &Channel) -> Result<(), VolumeE
 /// The volume of one channel.
 fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, VolumeError> {
     let selection = Selection { channel: settings.index, time: settings.time, level: settings.level };
+    let access = &access.of_spacing(settings.spacing);
     let volume = match &settings.volume {
         VolumeSource::File(path) => {
             Volume::read(path, &access.selecting(selection).of_series(settings.series.as_deref()))?

@@ -236,3 +236,35 @@ fn a_files_palette_is_a_colour_map() {
     let gray = format!("render {} --colormap file -o a.npy", gray.display());
     folder.run(&gray).assert_failure(2, &words);
 }
+
+/// A volume file from standard input is read as one from the disk; what is none is refused, and so is another file beside it.
+#[test]
+fn standard_input_is_a_volume_file() {
+    let folder = Folder::new();
+    let run = |input: &str, arguments: &str| {
+        let file = std::fs::File::open(folder.path(input)).unwrap();
+        folder.command(arguments).stdin(file).output().unwrap()
+    };
+    let values: Vec<f32> = (0..60).map(|at| at as f32).collect();
+    folder.write_nrrd("a.nrrd", [5, 4, 3], [1.0, 2.0, 3.0], &values);
+    let output = run("a.nrrd", "info - --json");
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let info: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&info["dims"], &info["format"]), (&serde_json::json!([5, 4, 3]), &Value::from("NRRD")));
+    assert_eq!([&info["min"], &info["max"]], [0.0, 59.0]);
+    folder.pixels("a.nrrd --size 16 --backend cpu");
+    assert!(run("a.nrrd", "render - --size 16 --backend cpu -o piped.npy").status.success());
+    assert_eq!(folder.read("piped.npy"), folder.read("pixels.npy"));
+    folder.write("text", b"no volume");
+    let refused = [
+        ("text", "info -", "-: format: found none"),
+        ("a.nrrd", "info - --memory 100", "standard input: more than the memory limit of 100 bytes"),
+        ("a.nrrd", "info - --set volume.labels=a.nrrd", "no such file among those given: -"),
+    ];
+    for (input, arguments, words) in refused {
+        let output = run(input, arguments);
+        let message = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{arguments}: {message}");
+        assert!(message.contains(words), "{arguments}: {message}");
+    }
+}

@@ -59,7 +59,7 @@ fn wrong_keys() {
         ("[5, 4, 3]", "[5, 4, 1.5]", "volume.dims[2]", "1.5 (float)", "three positive integers"),
         ("[5, 4, 3]", "[65536, 65536, 1]", "volume.dims", "65536", "at most 4294967295 voxels"),
         ("dims = [5, 4, 3]", "", "volume.dims", "no such key", "the sizes of a raw file"),
-        ("float32", "float16", "volume.type", "float16", "\"uint8\" or"),
+        ("float32", "float8", "volume.type", "float8", "\"uint8\" or"),
         ("type = 'float32'", "", "volume.type", "no such key", "\"uint8\" or"),
         ("big", "middle", "volume.endian", "middle", "\"little\" or \"big\""),
         ("endian = 'big'", "", "volume.endian", "no such key", "\"little\" or \"big\""),

@@ -6,8 +6,10 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::string::FromUtf8Error;
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::DVec3;
 
 use super::VolumeError;
 use super::address;
@@ -17,6 +19,8 @@ use super::inputs::Inputs;
 use super::located::{Located, Notes};
 use super::memory;
 use super::outputs::Outputs;
+use super::rounding::Rounding;
+use super::sample_type::SampleType;
 use super::series::Selection;
 
 /// Options for reading volumes, labels and scenes. By default files may lie anywhere.
@@ -143,7 +147,7 @@ impl ReadOptions {
 
 /// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
 #[derive(Clone)]
-pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>, Option<Arc<str>>);
+pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>, Option<Arc<str>>, Option<DVec3>);
 
 struct Inner {
     given: Option<Files>,
@@ -153,6 +157,10 @@ struct Inner {
     bytes_read: Option<BytesRead>,
     outputs: Outputs,
     inputs: Option<Inputs>,
+    /// What samples have lost since the last warning.
+    rounding: Mutex<Rounding>,
+    /// Whether a file that is read by boxes has warned of that.
+    has_warned: AtomicBool,
 }
 
 /// The folder to which files are confined.
@@ -174,19 +182,21 @@ impl Access {
         let limit = options.memory_limit();
         let (reserved, bytes_read) = (AtomicU64::new(0), options.bytes_read.clone());
         let (outputs, inputs) = (options.outputs.clone(), options.inputs.clone());
-        let inner = Inner { given, folder, limit, reserved, bytes_read, outputs, inputs };
+        let (rounding, has_warned) = Default::default();
+        let inner = Inner { given, folder, limit, reserved, bytes_read, outputs, inputs, rounding, has_warned };
         Ok(Self(
             Arc::new(inner),
             Selection { channel: options.channel, time: options.time, level: options.level },
             None,
             options.series.as_deref().map(Arc::from),
+            None,
         ))
     }
 
     /// The same access for readers that only note where samples are, and read none.
     pub(super) fn noting(&self) -> (Self, Arc<Notes>) {
         let notes = Arc::new(Notes::default());
-        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes)), self.3.clone()), notes)
+        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes)), self.3.clone(), self.4), notes)
     }
 
     /// Whether readers note where samples are, and read none.
@@ -201,6 +211,27 @@ impl Access {
         }
     }
 
+    /// Notes what samples have lost.
+    pub(super) fn note_rounding(&self, rounding: Rounding) {
+        if rounding != Rounding::default() {
+            let mut all = self.0.rounding.lock().unwrap_or_else(PoisonError::into_inner);
+            *all = all.max(rounding);
+        }
+    }
+
+    /// What samples have lost since the last call.
+    pub(super) fn take_rounding(&self) -> Rounding {
+        std::mem::take(&mut self.0.rounding.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// Warns at the first box of a store with whole numbers that were rounded.
+    pub(super) fn warn_of_box(&self, path: &Path, kind: SampleType, values: &[f32]) {
+        let rounding = self.take_rounding();
+        if rounding.is_of_whole_numbers() && !self.0.has_warned.swap(true, Ordering::Relaxed) {
+            rounding.warn(path, kind, values.into());
+        }
+    }
+
     /// The volumes that are read from files with several.
     pub(crate) fn selection(&self) -> Selection {
         self.1
@@ -209,7 +240,7 @@ impl Access {
     /// The same access to files of one volume, at a level.
     #[doc(hidden)]
     pub fn whole_at(&self, level: u32) -> Self {
-        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None, None)
+        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None, None, None)
     }
 
     /// The same access to other volumes of a file. What the options select goes before it.
@@ -217,14 +248,25 @@ impl Access {
     pub fn selecting(&self, other: Selection) -> Self {
         let Selection { channel, time, level } = self.1;
         let (channel, time, level) = (channel.or(other.channel), time.or(other.time), level.or(other.level));
-        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone(), self.3.clone())
+        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone(), self.3.clone(), self.4)
     }
 
     /// The same access to a series of a folder. The one that the options choose goes before it.
     #[doc(hidden)]
     pub fn of_series(&self, series: Option<&str>) -> Self {
         let series = self.3.clone().or_else(|| series.map(Arc::from));
-        Self(Arc::clone(&self.0), self.1, self.2.clone(), series)
+        Self(Arc::clone(&self.0), self.1, self.2.clone(), series, self.4)
+    }
+
+    /// The same access to a file in place of whose spacing the scene states another.
+    #[doc(hidden)]
+    pub fn of_spacing(&self, spacing: Option<DVec3>) -> Self {
+        Self(Arc::clone(&self.0), self.1, self.2.clone(), self.3.clone(), spacing)
+    }
+
+    /// The spacing that the scene states in place of the file's.
+    pub(super) fn spacing(&self) -> Option<DVec3> {
+        self.4
     }
 
     /// The series that is read of a folder with several; `None` for the largest.

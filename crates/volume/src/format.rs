@@ -135,7 +135,7 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
         },
         Format {
             name: "VTI",
-            extensions: &[".vti"],
+            extensions: &[".vti", ".vtr"],
             // Other texts may hold the element's name, too.
             is_magic: |head| {
                 let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();

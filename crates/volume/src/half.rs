@@ -1,25 +1,57 @@
 //! Numbers of 16 bits.
 
-/// The bytes of numbers of 32 bits with the values of numbers of 16 bits, in the machine's byte order.
-pub(super) fn widen(bytes: &[u8]) -> Vec<u8> {
-    bytes.as_chunks().0.iter().flat_map(|&half| value(u16::from_ne_bytes(half)).to_ne_bytes()).collect()
+use std::num::ParseFloatError;
+use std::str::FromStr;
+
+/// A number of 16 bits by IEEE 754: a sign, an exponent of 5 bits and a fraction of 10.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Half(u16);
+
+impl Half {
+    pub(super) const MAX: Self = Self(0x7bff);
+
+    /// The `f32` that equals it.
+    pub(super) fn value(self) -> f32 {
+        value(self.0)
+    }
+
+    pub(super) fn from_le_bytes(bytes: [u8; 2]) -> Self {
+        Self(u16::from_le_bytes(bytes))
+    }
+
+    #[cfg(feature = "dicom")]
+    pub(super) fn from_ne_bytes(bytes: [u8; 2]) -> Self {
+        Self(u16::from_ne_bytes(bytes))
+    }
+
+    pub(super) fn to_ne_bytes(self) -> [u8; 2] {
+        self.0.to_ne_bytes()
+    }
 }
 
-/// The value of a number by IEEE 754: a sign, an exponent of 5 bits and a fraction of 10.
+/// The nearest number.
+impl FromStr for Half {
+    type Err = ParseFloatError;
+
+    fn from_str(text: &str) -> Result<Self, ParseFloatError> {
+        text.parse().map(|number| Self(of(number)))
+    }
+}
+
+/// The value of a number's bits.
 fn value(bits: u16) -> f32 {
-    let (exponent, fraction) = (bits >> 10 & 31, f32::from(bits & 0x3ff) / 1024.0);
-    let size = match exponent {
-        0 => fraction * 2.0_f32.powi(-14),
-        31 if fraction > 0.0 => f32::NAN,
-        31 => f32::INFINITY,
-        _ => (1.0 + fraction) * 2.0_f32.powi(i32::from(exponent) - 15),
+    // The factor between the values that the exponents of `f32` and of 16 bits have with the same bits.
+    const FACTOR: f32 = (1_u128 << 112) as f32;
+    let size = u32::from(bits & 0x7fff);
+    let value = match size >> 10 {
+        31 => f32::from_bits(0x7f80_0000 | size << 13),
+        _ => f32::from_bits(size << 13) * FACTOR,
     };
-    if bits >> 15 == 1 { -size } else { size }
+    if bits >> 15 == 1 { -value } else { value }
 }
 
 /// The nearest number of 16 bits, of two the even one.
-#[cfg(feature = "zarr")]
-pub(super) fn of(value: f64) -> u16 {
+fn of(value: f64) -> u16 {
     let exponent = ((value.to_bits() >> 52 & 0x7ff) as i32 - 1023).max(-14);
     let bits = match exponent {
         _ if value.is_nan() => 0x7e00,
@@ -48,7 +80,6 @@ mod tests {
         assert!(value(0x7c01).is_nan());
     }
 
-    #[cfg(feature = "zarr")]
     #[test]
     fn every_half_is_its_own_nearest() {
         for bits in (0..=u16::MAX).filter(|&bits| !value(bits).is_nan()) {

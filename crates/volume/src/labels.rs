@@ -59,7 +59,8 @@ impl Labels {
     fn oriented(path: &Path, access: &Access) -> Result<(Self, Option<Orientation>), VolumeError> {
         let (_, loaded) = format::read::<u16>(path, access)?;
         loaded.check_single(path, "one: a label for every voxel")?;
-        let Loaded { dims, spacing, label_names: names, values, orientation, .. } = loaded;
+        let names = loaded.legend(access.selection().channel.unwrap_or(0) as usize, 0).names;
+        let Loaded { dims, spacing, values, orientation, .. } = loaded;
         let origin = path.display().to_string();
         Ok((Self { origin, dims, spacing, values: values.into(), names }, orientation))
     }

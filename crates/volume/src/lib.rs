@@ -31,7 +31,6 @@ mod folder;
 mod format;
 mod grid;
 mod guard;
-#[cfg(any(feature = "npy", feature = "tiff", feature = "zarr"))]
 mod half;
 mod head;
 mod identity;
@@ -60,6 +59,7 @@ pub mod parallel;
 pub mod range;
 mod raw;
 mod resample;
+mod rounding;
 mod sample;
 mod sample_type;
 mod samples;
@@ -75,7 +75,7 @@ mod texel;
 mod text;
 #[cfg(feature = "tiff")]
 mod tiff;
-#[cfg(feature = "dicom")]
+#[cfg(any(feature = "dicom", feature = "vtk"))]
 mod uneven;
 mod unit;
 mod value_slice;

@@ -26,10 +26,8 @@ pub(super) struct Loaded<T: Voxel> {
     pub(super) value_unit: Option<String>,
     /// The orientation, if the file states it.
     pub(super) orientation: Option<Orientation>,
-    /// The colours that the file assigns to values, in ascending order of values.
-    pub(super) palette: Option<Vec<(f64, DVec3)>>,
-    /// The values' names, if they are labels.
-    pub(super) label_names: BTreeMap<u16, String>,
+    /// The names and colours of values: one legend for the file, or one for each channel.
+    pub(super) legends: Vec<Legend>,
     /// The volumes in the file.
     pub(super) series: Series,
     /// The names of the file's channels, from the first on; there may be fewer than channels.
@@ -44,6 +42,23 @@ pub(super) struct Loaded<T: Voxel> {
     pub(super) levels: Option<Levels>,
     /// One value per voxel, x fastest, channel by channel.
     pub values: T::Many,
+}
+
+/// What a file says of single values.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Legend {
+    /// The values' names, if they are labels.
+    pub(super) names: BTreeMap<u16, String>,
+    /// Their colours, in ascending order of values.
+    pub(super) palette: Option<Vec<(f64, DVec3)>>,
+}
+
+impl Legend {
+    /// Colours of values without names.
+    #[cfg(any(feature = "dicom", feature = "tiff"))]
+    pub(super) fn of_palette(palette: Option<Vec<(f64, DVec3)>>) -> Self {
+        Self { names: BTreeMap::new(), palette }
+    }
 }
 
 /// The levels of a volume, and the one that is read (SPEC §13).
@@ -61,8 +76,8 @@ pub(super) struct Levels {
 impl<T: Voxel> Loaded<T> {
     /// Values about which the file states nothing else.
     pub(super) fn new(dims: UVec3, kind: SampleType, values: T::Many) -> Self {
-        let (label_names, series, channel_names) = (BTreeMap::new(), Series::default(), Vec::new());
-        let (spacing, unit, orientation, palette) = (None, None, None, None);
+        let (legends, series, channel_names) = (Vec::new(), Series::default(), Vec::new());
+        let (spacing, unit, orientation) = (None, None, None);
         let (time_names, series_names) = (Vec::new(), Vec::new());
         let (displays, levels, value_unit) = (Vec::new(), None, None);
         Self {
@@ -72,8 +87,7 @@ impl<T: Voxel> Loaded<T> {
             unit,
             value_unit,
             orientation,
-            palette,
-            label_names,
+            legends,
             series,
             channel_names,
             time_names,
@@ -84,9 +98,11 @@ impl<T: Voxel> Loaded<T> {
         }
     }
 
-    /// What the file, of some format, states about one of its channels.
-    pub(super) fn facts(&self, format: &'static str, channel: usize) -> StoreFacts {
-        let Self { series, spacing, unit, orientation, palette, label_names, .. } = self;
+    /// What the file, of some format, states about one of its channels, `number` among those that are read. What concerns all of them is the first one's.
+    pub(super) fn facts(&self, format: &'static str, channel: usize, number: usize) -> StoreFacts {
+        let Self { series, spacing, unit, .. } = self;
+        let Legend { names: label_names, palette } = self.legend(channel, number);
+        let orientation = self.orientation.filter(|_| number == 0);
         let channels = if series.is_color { 1 } else { series.channels };
         let display = self.displays.get(channel).filter(|display| **display != ChannelDisplay::default());
         StoreFacts {
@@ -94,14 +110,23 @@ impl<T: Voxel> Loaded<T> {
             spacing: *spacing,
             unit: unit.clone(),
             value_unit: self.value_unit.clone(),
-            orientation: *orientation,
-            palette: palette.clone(),
-            label_names: label_names.clone(),
+            orientation,
+            palette,
+            label_names,
             channel_name: self.channel_names.get(channel).cloned(),
             display: display.cloned(),
             time_names: self.time_names.clone(),
             series_names: self.series_names.clone(),
         }
+    }
+
+    /// The legend of one of the file's channels, `number` among those that are read.
+    pub(super) fn legend(&self, channel: usize, number: usize) -> Legend {
+        let legend = match self.legends.as_slice() {
+            [of_all] => Some(of_all).filter(|_| number == 0),
+            of_channels => of_channels.get(channel),
+        };
+        legend.cloned().unwrap_or_default()
     }
 
     /// Checks that the values are those of one channel.

@@ -19,16 +19,15 @@ use super::samples::Samples;
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::source::{MAX_HEADER, Source};
 use super::stream::Stream;
-use super::text::{number, shown, three};
-use super::unit::unit;
+use super::text::{number, shown};
+use super::unit::{self, NON_UNIFORM, unit, warn_of_itk};
 use super::voxel::Voxel;
 
 /// Reads one MetaImage file, or the header and the data file it names.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
-    let channels = header.channels()?;
-    let series = Series { channels, times: 1, order: SeriesOrder::Interleaved, is_color: false };
+    let series = header.series()?;
     let (spacing, orientation) = (header.spacing()?, header.orientation()?);
     let samples = header.samples()?;
     let (is_compressed, header_size) = (header.flag("CompressedData")?.unwrap_or(false), header.header_size()?);
@@ -40,15 +39,16 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         stream.series::<T>(samples, &series, false)
     };
     let values = match header.data_files(&samples)? {
-        Some(files) if channels > 1 && files.count() > 1 => {
-            let found = format!("{channels} in {} files", files.count());
-            return Err(header.0.invalid("ElementNumberOfChannels", found, "several channels in one file"));
+        Some(files) if series.count() > 1 && files.count() > 1 => {
+            let found = format!("{} volumes in {} files", series.count(), files.count());
+            return Err(header.0.invalid("ElementDataFile", found, "one file of several channels or times"));
         }
         Some(files) => files.read::<T>(path, "ElementDataFile", &samples, access, read)?,
         None => read(file, &samples)?,
     };
     let Samples { dims, kind, .. } = samples;
     let unit = header.0.get("DistanceUnits").and_then(unit);
+    warn_of_itk(path, header.0.get(NON_UNIFORM));
     let loaded = Loaded::new(dims, kind, values);
     Ok(Loaded { spacing, unit, orientation, series, ..loaded })
 }
@@ -75,18 +75,30 @@ impl Header {
         Err(fields.invalid("header", "the end of the file", "a last field ElementDataFile"))
     }
 
-    /// The number of numbers for each voxel. Refuses anything but a volume.
-    fn channels(&self) -> Result<u32, VolumeError> {
+    /// The number of axes: three, and perhaps that of times.
+    fn axes(&self) -> Result<usize, VolumeError> {
+        self.0.value("NDims", "3 or 4", |text| text?.parse().ok().filter(|axes| [3, 4].contains(axes)))
+    }
+
+    /// The channels, which are the numbers of each voxel, and the times. Refuses anything but a volume.
+    fn series(&self) -> Result<Series, VolumeError> {
         let is = |name: &str, expected: &str, default: &str| {
             let matches = |text: Option<&str>| (text.unwrap_or(default).eq_ignore_ascii_case(expected)).then_some(());
             self.0.value(name, expected, matches)
         };
         is("ObjectType", "Image", "Image")?;
-        is("NDims", "3", "")?;
         is("BinaryData", "True", "True")?;
-        self.0.value("ElementNumberOfChannels", &format!("1 to {MAX_CHANNELS}"), |text| {
+        let channels = self.0.value("ElementNumberOfChannels", &format!("1 to {MAX_CHANNELS}"), |text| {
             text.unwrap_or("1").parse().ok().filter(|channels| (1..=MAX_CHANNELS).contains(channels))
-        })
+        })?;
+        let times = match self.axes()? {
+            3 => 1,
+            _ => self.0.value("DimSize", &format!("{SIZES}, and a number of times"), |text| {
+                text?.split_whitespace().nth(3)?.parse().ok().filter(|&times| times > 0)
+            })?,
+        };
+        let order = if channels > 1 { SeriesOrder::Interleaved } else { SeriesOrder::ChannelsFirst };
+        Ok(Series { channels, times, order, is_color: false })
     }
 
     /// A field that is `True` or `False`.
@@ -99,18 +111,28 @@ impl Header {
         })
     }
 
-    /// N numbers, from the first field with one of these names that is present.
-    fn numbers<const N: usize>(&self, names: &[&str]) -> Result<Option<(String, [f64; N])>, VolumeError> {
+    /// `count` numbers, from the first field with one of these names that is present.
+    fn numbers(&self, names: &[&str], count: usize) -> Result<Option<(String, Vec<f64>)>, VolumeError> {
         let Some(name) = names.iter().find(|name| self.0.get(name).is_some()) else { return Ok(None) };
-        let numbers = self.0.value(name, &format!("finite numbers, {N} of them"), |text| {
-            text?.split_whitespace().map(number).collect::<Option<Vec<_>>>()?.try_into().ok()
+        let numbers = self.0.value(name, &format!("finite numbers, {count} of them"), |text| {
+            let numbers = text?.split_whitespace().map(number).collect::<Option<Vec<_>>>()?;
+            Some(numbers).filter(|numbers| numbers.len() == count)
         })?;
         Ok(Some(((*name).to_owned(), numbers)))
     }
 
+    /// A number for each axis in space, from the first field with one of these names that is present.
+    fn in_space(&self, names: &[&str]) -> Result<Option<(String, DVec3)>, VolumeError> {
+        let found = self.numbers(names, self.axes()?)?;
+        Ok(found.map(|(name, numbers)| (name, DVec3::from_slice(&numbers))))
+    }
+
     fn samples(&self) -> Result<Samples, VolumeError> {
+        let axes = self.axes()?;
         let dims: UVec3 = self.0.value("DimSize", SIZES, |text| {
-            dims_of(three(text?.split_whitespace().map(|size| size.parse::<u32>().ok()))?)
+            let sizes: Option<Vec<u32>> = text?.split_whitespace().map(|size| size.parse().ok()).collect();
+            let sizes = sizes.filter(|sizes| sizes.len() == axes)?;
+            dims_of([sizes[0], sizes[1], sizes[2]])
         })?;
         let kind = self.0.value("ElementType", TYPES, |text| sample_type(text?))?;
         let (old, new) = ("ElementByteOrderMSB", "BinaryDataByteOrderMSB");
@@ -122,7 +144,7 @@ impl Header {
             (None, None) if kind.bytes() == 1 => false,
             (None, None) => return Err(self.0.invalid("BinaryDataByteOrderMSB", "no such field", "True or False")),
         };
-        let one = |name: &str| self.numbers::<1>(&[name]).map(|found| found.map(|(_, [number])| number));
+        let one = |name: &str| self.numbers(&[name], 1).map(|found| found.map(|(_, numbers)| numbers[0]));
         let slope = one("ElementToIntensityFunctionSlope")?.unwrap_or(1.0);
         let intercept = one("ElementToIntensityFunctionOffset")?.unwrap_or(0.0);
         let rescale = Some([slope, intercept]).filter(|&rescale| rescale != [1.0, 0.0]);
@@ -130,23 +152,24 @@ impl Header {
     }
 
     fn spacing(&self) -> Result<Option<DVec3>, VolumeError> {
-        let Some((name, spacing)) = self.numbers(&["ElementSpacing", "ElementSize"])? else { return Ok(None) };
-        if spacing.iter().any(|&spacing| spacing <= 0.0) {
-            return Err(self.0.invalid(&name, format!("{spacing:?}"), "three positive finite numbers"));
-        }
-        Ok(Some(DVec3::from_array(spacing)))
+        let Some((name, spacing)) = self.in_space(&["ElementSpacing", "ElementSize"])? else { return Ok(None) };
+        let spacing = spacing.to_array();
+        unit::known((&self.0.path, &name), spacing)
+            .map(Some)
+            .ok_or_else(|| self.0.invalid(&name, format!("{spacing:?}"), "three positive finite numbers, or 0"))
     }
 
-    /// The orientation; three numbers at a time are an axis of the volume.
+    /// The orientation; each row of the matrix is an axis of the volume, of which that of times is not looked at.
     fn orientation(&self) -> Result<Option<Orientation>, VolumeError> {
-        let Some((name, matrix)) = self.numbers(&["TransformMatrix", "Rotation", "Orientation"])? else {
+        let count = self.axes()?;
+        let names = ["TransformMatrix", "Rotation", "Orientation"];
+        let Some((name, matrix)) = self.numbers(&names, count * count)? else {
             return Ok(None);
         };
-        let columns = DMat3::from_cols_array(&matrix);
-        let axes = unit_directions([columns.x_axis, columns.y_axis, columns.z_axis])
+        let axes = unit_directions([0, 1, 2].map(|axis| DVec3::from_slice(&matrix[axis * count..])))
             .map_err(|(found, allowed)| self.0.invalid(&name, found, allowed))?;
-        let origin = self.numbers(&["Offset", "Position", "Origin"])?;
-        let origin = origin.map_or(DVec3::ZERO, |(_, origin)| DVec3::from_array(origin));
+        let origin = self.in_space(&["Offset", "Position", "Origin"])?;
+        let origin = origin.map_or(DVec3::ZERO, |(_, origin)| origin);
         Ok(Some(Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * axes, origin: RAS_FROM_LPS * origin }))
     }
 

@@ -14,6 +14,7 @@ use super::loaded::Loaded;
 use super::orientation::Orientation;
 use super::sample_type::SampleType;
 use super::samples::Samples;
+use super::series::Series;
 use super::shear::{self, Lattice};
 use super::stream::Stream;
 use super::voxel::Voxel;
@@ -28,7 +29,7 @@ const TYPES: [(i32, SampleType); 4] =
 /// The fields with the directions.
 const DIRECTIONS: &str = "x_ras, y_ras, z_ras";
 
-/// Reads a file with one frame.
+/// Reads a file, whose frames are times.
 pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let mut file = access.open(path)?;
     let is_gzip = file.reader.fill_buf().map_err(io_error(path))?.starts_with(&[0x1f, 0x8b]);
@@ -39,9 +40,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     }
     let sizes = [4, 8, 12].map(|at| header.i32(at));
     let dims = dims_of(sizes).ok_or_else(|| invalid(path, "width, height, depth", format!("{sizes:?}"), SIZES))?;
-    if header.i32(16) != 1 {
-        return Err(invalid(path, "nframes", header.i32(16), "1: a volume of one frame"));
-    }
+    let times = u32::try_from(header.i32(16)).ok().filter(|&frames| frames > 0);
+    let times = times.ok_or_else(|| invalid(path, "nframes", header.i32(16), "a positive number of frames"))?;
+    let series = Series { times, ..Series::default() };
     let code = header.i32(20);
     let Some(&(_, kind)) = TYPES.iter().find(|(known, _)| *known == code) else {
         let allowed = TYPES.map(|(code, kind)| format!("{code} ({kind})")).join(", ");
@@ -62,7 +63,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let samples = Samples { kind, dims, big_endian: true, rescale: None, z_fastest: false };
     let orientation = Some(Orientation { axes: lattice.axes, origin });
     let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
-    let loaded = Loaded { spacing, unit, orientation, ..Loaded::new(dims, kind, stream.samples::<T>(&samples, true)?) };
+    let loaded = Loaded::new(dims, kind, stream.series::<T>(&samples, &series, true)?);
+    let loaded = Loaded { spacing, unit, orientation, series, ..loaded };
     lattice.straighten(path, DIRECTIONS, loaded, access)
 }
 

@@ -2,7 +2,8 @@
 //! gzipped or not.
 //!
 //! The sform determines spacing and orientation, or else the qform; without either only `pixdim` counts. The file must end where the
-//! samples end. Headers that break the standard's rules are read as nibabel and ITK read them. The value of a complex sample is its
+//! samples end. A pair of files without NIfTI's magic is Analyze 7.5, which has the same fields but no affine and no unit other than millimetres.
+//! Headers that break the standard's rules are read as nibabel and ITK read them. The value of a complex sample is its
 //! magnitude.
 
 use std::io::BufRead;
@@ -42,6 +43,9 @@ const COLOR_TYPES: [(i64, u32); 2] = [(128, 3), (2304, 4)];
 
 /// Codes of complex data types, and the type of their parts.
 const COMPLEX_TYPES: [(i64, SampleType); 2] = [(32, SampleType::F32), (1792, SampleType::F64)];
+
+/// The code of millimetres.
+const MILLIMETERS: u8 = 2;
 
 /// The fields with the sform.
 const SFORM: &str = "srow_x, srow_y, srow_z";
@@ -191,9 +195,16 @@ impl Header {
             bytes.extend(stream.bytes(540 - 348)?);
         }
         let magic = if version == 1 { &bytes[344..348] } else { &bytes[4..12] };
+        let mut is_analyze = false;
         let is_pair = match magic {
             b"n+1\0" | b"n+2\0\r\n\x1a\n" => false,
             b"ni1\0" | b"ni2\0\r\n\x1a\n" => true,
+            // There lies the minimum of all values.
+            [first, ..] if version == 1 && *first != b'n' && sibling(path, ".hdr", ".img").is_some() => {
+                log::warn!("{}: Analyze 7.5, which does not say which side is left", path.display());
+                is_analyze = true;
+                true
+            }
             other => {
                 let allowed = if version == 1 { "n+1 or ni1" } else { "n+2 or ni2, then \\0\\r\\n\\x1a\\n" };
                 return Err(invalid(path, "magic", format!("\"{}\"", other.escape_ascii()), allowed));
@@ -203,6 +214,7 @@ impl Header {
         let bytes = Bytes { bytes, big_endian };
         if version == 1 {
             let [[vox_offset], [slope], [intercept]] = [108, 112, 116].map(|at| bytes.f32s(at));
+            let code = |at: usize| if is_analyze { 0 } else { bytes.i16(at) };
             return Ok(Self {
                 path,
                 bytes: 348,
@@ -212,11 +224,11 @@ impl Header {
                 datatype: bytes.i16(70),
                 bitpix: bytes.i16(72),
                 pixdim: bytes.f32s(76),
-                xyzt_units: bytes.bytes[123],
+                xyzt_units: if is_analyze { MILLIMETERS } else { bytes.bytes[123] },
                 vox_offset,
                 slope_and_intercept: [slope, intercept],
-                qform_code: bytes.i16(252),
-                sform_code: bytes.i16(254),
+                qform_code: code(252),
+                sform_code: code(254),
                 quatern_bcd: DVec3::from_array(bytes.f32s(256)),
                 qoffset: DVec3::from_array(bytes.f32s(268)),
                 srows: [280, 296, 312].map(|at| bytes.f32s(at)),
@@ -324,7 +336,7 @@ impl Header {
         // The higher bits are the unit of time.
         let name = match self.xyzt_units & 7 {
             1 => "m",
-            2 => "mm",
+            MILLIMETERS => "mm",
             3 => "µm",
             _ => return None,
         };

@@ -23,7 +23,9 @@ use super::text::shown;
 use super::values::Values;
 use super::voxel::Voxel;
 
-const TYPES: [(&str, SampleType); 10] = [
+/// The names of types. Truth is a byte, 0 or 1.
+const TYPES: [(&str, SampleType); 12] = [
+    ("b1", SampleType::U8),
     ("i1", SampleType::I8),
     ("u1", SampleType::U8),
     ("i2", SampleType::I16),
@@ -32,6 +34,7 @@ const TYPES: [(&str, SampleType); 10] = [
     ("u4", SampleType::U32),
     ("i8", SampleType::I64),
     ("u8", SampleType::U64),
+    ("f2", SampleType::F16),
     ("f4", SampleType::F32),
     ("f8", SampleType::F64),
 ];

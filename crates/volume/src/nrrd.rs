@@ -14,7 +14,7 @@ use super::data_files::DataFiles;
 use super::error::volume::{invalid, io_error};
 use super::fields::Fields;
 use super::grid::{SIZES, dims_of};
-use super::loaded::Loaded;
+use super::loaded::{Legend, Loaded};
 use super::numbers::TextEnd;
 use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::sample_type::SampleType;
@@ -23,8 +23,8 @@ use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
 use super::source::{MAX_HEADER, Source};
 use super::stream::Stream;
-use super::text::{lower, number, shown, three, vector};
-use super::unit;
+use super::text::{lower, shown, three, vector};
+use super::unit::{self, NON_UNIFORM, warn_of_itk};
 use super::voxel::Voxel;
 
 /// The field with the axes, which need not be at right angles.
@@ -36,7 +36,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let header = Header::read(&mut file)?;
     let axes = header.axes()?;
     let dims = header.dims(&axes)?;
-    let (lattice, orientation) = header.lattice_and_orientation(&axes)?;
+    let Place { lattice, orientation, unit } = header.place(&axes)?;
     let layout = header.layout(dims, axes.series)?;
     let values = match header.data_files()? {
         Some(files) if axes.series.count() > 1 && files.count() > 1 => {
@@ -46,13 +46,13 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
             .read::<T>(path, "data file", &layout.samples, access, |file, samples| layout.read::<T>(file, samples))?,
         None => layout.read::<T>(file, &layout.samples)?,
     };
-    let unit = header.unit();
     let loaded = Loaded::new(dims, layout.samples.kind, values);
     let spacing = lattice.map(|lattice| lattice.spacing);
     let series = axes.series;
-    let (label_names, palette) = (header.label_names(), header.palette());
+    let legends = header.legends(series);
+    warn_of_itk(path, header.1.get(NON_UNIFORM).map(String::as_str));
     let value_unit = header.value_unit();
-    let loaded = Loaded { spacing, unit, value_unit, orientation, label_names, palette, series, ..loaded };
+    let loaded = Loaded { spacing, unit, value_unit, orientation, legends, series, ..loaded };
     match lattice {
         Some(lattice) => lattice.straighten(path, DIRECTIONS, loaded, access),
         None => Ok(loaded),
@@ -61,7 +61,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
 
 /// The meaning of a file's axes.
 struct Axes {
-    /// The one of four axes that is not in space.
+    /// The one of five axes that has one sample and is left out.
+    left_out: Option<usize>,
+    /// The one of the other axes that is not in space.
     other: Option<usize>,
     series: Series,
 }
@@ -69,8 +71,20 @@ struct Axes {
 impl Axes {
     /// The words about axes in space.
     fn in_space<'a>(&self, words: impl Iterator<Item = &'a str>) -> impl Iterator<Item = &'a str> {
-        words.enumerate().filter(|(axis, _)| Some(*axis) != self.other).map(|(_, word)| word)
+        without(without(words, self.left_out), self.other)
     }
+}
+
+/// Where the voxels lie, as far as a file states it.
+struct Place {
+    lattice: Option<Lattice>,
+    orientation: Option<Orientation>,
+    unit: Option<String>,
+}
+
+/// The words about all axes but one.
+fn without<'a>(words: impl Iterator<Item = &'a str>, axis: Option<usize>) -> impl Iterator<Item = &'a str> {
+    words.enumerate().filter(move |(at, _)| Some(*at) != axis).map(|(_, word)| word)
 }
 
 /// The fields of a header under the first of their spellings, its key/value pairs, and the names of files in a list at its end.
@@ -134,22 +148,39 @@ impl Header {
     /// The axes in space, and the fourth one: the channels of a voxel if it is the first axis, times if it is the last, unless its kind says that
     /// these are channels.
     fn axes(&self) -> Result<Axes, VolumeError> {
-        let dimension = self.0.value("dimension", "3 or 4", |text| {
-            text?.parse::<u32>().ok().filter(|dimension| [3, 4].contains(dimension))
+        let dimension = self.0.value("dimension", "3 or 4, or 5 if an axis has one sample", |text| {
+            text?.parse::<usize>().ok().filter(|dimension| (3..=5).contains(dimension))
         })?;
         if dimension == 3 {
-            return Ok(Axes { other: None, series: Series::default() });
+            return Ok(Axes { left_out: None, other: None, series: Series::default() });
         }
-        let sizes = self.0.value("sizes", "four positive integers", |text| {
+        let mut sizes = self.0.value("sizes", &format!("{dimension} positive integers"), |text| {
             let sizes: Option<Vec<u32>> = text?.split_whitespace().map(|size| size.parse().ok()).collect();
-            sizes.filter(|sizes| sizes.len() == 4 && sizes.iter().all(|&size| size > 0))
+            sizes.filter(|sizes| sizes.len() == dimension && sizes.iter().all(|&size| size > 0))
         })?;
         let kinds = self.0.get("kinds").map(lower).unwrap_or_default();
         let kinds: Vec<&str> = kinds.split_whitespace().collect();
         let in_space = |kind: &str| ["domain", "space", "???", "none"].contains(&kind);
-        let by_kind = kinds.iter().position(|kind| !in_space(kind));
         let words = self.0.get(DIRECTIONS).or(self.0.get("spacings")).map(lower).unwrap_or_default();
-        let by_direction = words.split_whitespace().position(|word| ["none", "nan"].contains(&word));
+        let words: Vec<&str> =
+            if words.contains('(') { vector_words(&words) } else { words.split_whitespace().collect() };
+        let is_none = |word: &str| ["none", "nan"].contains(&word);
+        // Of several, the last that is not in space, or else the last.
+        let in_no_space = |&axis: &usize| {
+            kinds.get(axis).is_some_and(|kind| !in_space(kind)) || words.get(axis).is_some_and(|word| is_none(word))
+        };
+        let single = || (0..dimension).rev().filter(|&axis| sizes[axis] == 1);
+        let left_out = if dimension == 5 { single().find(in_no_space).or(single().next()) } else { None };
+        if dimension == 5 && left_out.is_none() {
+            return Err(self.0.invalid("sizes", format!("{sizes:?}"), "five of which one is 1"));
+        }
+        let kinds: Vec<&str> = without(kinds.into_iter(), left_out).collect();
+        let words: Vec<&str> = without(words.into_iter(), left_out).collect();
+        if let Some(axis) = left_out {
+            sizes.remove(axis);
+        }
+        let by_kind = kinds.iter().position(|kind| !in_space(kind));
+        let by_direction = words.iter().position(|word| is_none(word));
         let other = by_kind.or(by_direction).unwrap_or(3);
         let is_time = match kinds.get(other) {
             Some(&"time") => true,
@@ -174,7 +205,7 @@ impl Header {
         if series.channels > MAX_CHANNELS {
             return Err(self.0.invalid("sizes", format!("{count} channels"), format!("at most {MAX_CHANNELS}")));
         }
-        Ok(Axes { other: Some(other), series })
+        Ok(Axes { left_out, other: Some(other), series })
     }
 
     fn dims(&self, axes: &Axes) -> Result<UVec3, VolumeError> {
@@ -183,18 +214,27 @@ impl Header {
         })
     }
 
-    fn lattice_and_orientation(&self, axes: &Axes) -> Result<(Option<Lattice>, Option<Orientation>), VolumeError> {
+    fn place(&self, axes: &Axes) -> Result<Place, VolumeError> {
         match (self.0.get("spacings"), self.0.get(DIRECTIONS)) {
-            (None, None) => Ok((None, None)),
+            (None, None) => Ok(Place { lattice: None, orientation: None, unit: self.unit(axes, DVec3::ONE).0 }),
             (None, Some(_)) => {
-                let lattice = self.directions(axes)?;
-                Ok((Some(lattice), self.orientation(lattice.axes)?))
+                let vectors = self.directions(axes)?;
+                let along = |axis: usize| vectors.iter().map(|vector| vector[axis].abs()).fold(0.0, f64::max);
+                let (unit, factors) = self.unit(axes, DVec3::new(along(0), along(1), along(2)));
+                let lattice = Lattice::of(vectors.map(|vector| factors * vector));
+                let lattice = lattice.map_err(|found| self.0.invalid(DIRECTIONS, found, shear::allowed()))?;
+                let orientation = self.orientation(lattice.axes, factors)?;
+                Ok(Place { lattice: Some(lattice), orientation, unit })
             }
-            (Some(_), None) => self.0.value("spacings", "three positive finite numbers", |text| {
-                let spacings = three(axes.in_space(text?.split_whitespace()).map(number))?;
-                let lattice = Lattice::straight(DVec3::from_array(spacings), DMat3::IDENTITY);
-                spacings.iter().all(|&spacing| spacing > 0.0).then_some((Some(lattice), None))
-            }),
+            (Some(_), None) => {
+                let spacings = self.0.value("spacings", "three positive finite numbers, or 0 or NaN", |text| {
+                    let spacings = three(axes.in_space(text?.split_whitespace()).map(|word| word.parse().ok()))?;
+                    unit::known((&self.0.path, "spacings"), spacings)
+                })?;
+                let (unit, factors) = self.unit(axes, spacings);
+                let lattice = Some(Lattice::straight(factors * spacings, DMat3::IDENTITY));
+                Ok(Place { lattice, orientation: None, unit })
+            }
             (Some(_), Some(_)) => {
                 let allowed = "one of `spacings` and `space directions`";
                 Err(self.0.invalid(DIRECTIONS, "`spacings` as well", allowed))
@@ -202,10 +242,21 @@ impl Header {
         }
     }
 
-    /// The unit that all axes share, from the space or else from the array: three quoted names.
-    fn unit(&self) -> Option<String> {
-        let names = self.0.get("space units").or(self.0.get("units"))?.split('"').skip(1).step_by(2);
-        unit::common(names)
+    /// The unit, and the factors of lengths along the axes of space, or of the array: quoted names.
+    fn unit(&self, axes: &Axes, spacing: DVec3) -> (Option<String>, DVec3) {
+        let quoted = |text: &'_ str| text.split('"').skip(1).step_by(2).map(str::to_owned).collect::<Vec<_>>();
+        let (field, names) = match (self.0.get("space units").map(quoted), self.0.get("units").map(quoted)) {
+            (Some(names), _) => ("space units", names),
+            (None, Some(names)) if names.len() == 3 => ("units", names),
+            (None, Some(names)) => {
+                ("units", axes.in_space(names.iter().map(String::as_str)).map(str::to_owned).collect())
+            }
+            (None, None) => return (None, DVec3::ONE),
+        };
+        match names.as_slice() {
+            [x, y, z] => unit::shared((&self.0.path, field), spacing, [x, y, z].map(|name| Some(name.as_str()))),
+            _ => (None, DVec3::ONE),
+        }
     }
 
     /// The unit of the values.
@@ -214,13 +265,22 @@ impl Header {
         (!stated.is_empty()).then(|| stated.to_owned())
     }
 
-    /// The names of segments, as 3D Slicer writes them: `Segment0_LabelValue:=3`, `Segment0_Name:=liver`.
-    fn label_names(&self) -> BTreeMap<u16, String> {
-        self.segments("_Name").map(|(label, name)| (label, name.clone())).collect()
+    /// The names and colours of segments, as 3D Slicer writes them: `Segment0_LabelValue:=3`, `Segment0_Name:=liver`, and three numbers in [0, 1],
+    /// `Segment0_Color:=0.5 0.68 0.2`. Where segments overlap, labels lie in several layers, which are channels: `Segment0_Layer:=1`.
+    fn legends(&self, series: Series) -> Vec<Legend> {
+        let legend = |layer: Option<u32>| {
+            let names = self.segments("_Name", layer).map(|(label, name)| (label, name.clone())).collect();
+            Legend { names, palette: self.palette(layer) }
+        };
+        if series.channels > 1 {
+            (0..series.channels).map(|layer| legend(Some(layer))).collect()
+        } else {
+            vec![legend(None)]
+        }
     }
 
-    /// The colours of segments, of which each has three numbers in [0, 1]: `Segment0_Color:=0.5 0.68 0.2`.
-    fn palette(&self) -> Option<Vec<(f64, DVec3)>> {
+    /// The colours of the segments of a layer, or of all.
+    fn palette(&self, layer: Option<u32>) -> Option<Vec<(f64, DVec3)>> {
         let color = |text: &String| {
             let numbers: Option<Vec<f64>> = text.split_whitespace().map(|number| number.parse().ok()).collect();
             let [red, green, blue] = numbers?.try_into().ok()?;
@@ -228,40 +288,38 @@ impl Header {
                 .filter(|color| color.cmpge(DVec3::ZERO).all() && color.cmple(DVec3::ONE).all())
         };
         let colors: BTreeMap<u16, DVec3> =
-            self.segments("_Color").filter_map(|(label, text)| Some((label, color(text)?))).collect();
+            self.segments("_Color", layer).filter_map(|(label, text)| Some((label, color(text)?))).collect();
         (!colors.is_empty()).then(|| colors.into_iter().map(|(label, color)| (f64::from(label), color)).collect())
     }
 
-    /// The labels of segments, and what is said of each by a key with some end.
-    fn segments(&self, end: &str) -> impl Iterator<Item = (u16, &String)> {
+    /// The labels of the segments of a layer, or of all, and what is said of each by a key with some end.
+    fn segments(&self, end: &str, layer: Option<u32>) -> impl Iterator<Item = (u16, &String)> {
         self.1.iter().filter_map(move |(key, value)| {
             let segment = key.strip_suffix("_LabelValue").filter(|segment| segment.starts_with("Segment"))?;
+            // One that states no layer lies in the first.
+            let own = self.1.get(&format!("{segment}_Layer")).map_or(Some(0), |layer| layer.parse().ok());
+            if layer.is_some_and(|layer| own != Some(layer)) {
+                return None;
+            }
             Some((value.parse().ok()?, self.1.get(&format!("{segment}{end}"))?))
         })
     }
 
-    /// The lattice that `space directions` gives.
-    fn directions(&self, of: &Axes) -> Result<Lattice, VolumeError> {
+    /// The vectors of `space directions`.
+    fn directions(&self, of: &Axes) -> Result<[DVec3; 3], VolumeError> {
         let allowed = "three vectors (x,y,z) of positive finite length, none of them `none`";
-        let axes = self.0.value(DIRECTIONS, allowed, |text| {
+        self.0.value(DIRECTIONS, allowed, |text| {
             // That of an axis which is not in space is `none`.
-            let axes = match of.other {
-                None => vectors(text?)?,
-                Some(other) => {
-                    let text = lower(text?);
-                    let at = text.find("none")?;
-                    let is_there =
-                        if other == 0 { text[..at].trim().is_empty() } else { text[at + 4..].trim().is_empty() };
-                    vectors(text.replacen("none", "", 1).trim()).filter(|_| is_there)?
-                }
-            };
+            let text = lower(text?);
+            let words: Vec<&str> = without(vector_words(&text).into_iter(), of.left_out).collect();
+            let is_there = of.other.is_none_or(|other| words.get(other) == Some(&"none"));
+            let axes = three(without(words.into_iter(), of.other).map(vector)).filter(|_| is_there)?;
             axes.iter().all(|axis| axis.length() > 0.0 && axis.length().is_finite()).then_some(axes)
-        })?;
-        Lattice::of(axes).map_err(|found| self.0.invalid(DIRECTIONS, found, shear::allowed()))
+        })
     }
 
     /// The orientation for axes with these directions; `None` in a space that is not a patient's.
-    fn orientation(&self, axes: DMat3) -> Result<Option<Orientation>, VolumeError> {
+    fn orientation(&self, axes: DMat3, factors: DVec3) -> Result<Option<Orientation>, VolumeError> {
         let ras_from_space = match self.0.get("space").map(lower).as_deref() {
             Some("right-anterior-superior" | "ras") => DVec3::ONE,
             Some("left-anterior-superior" | "las") => DVec3::new(-1.0, 1.0, 1.0),
@@ -270,7 +328,7 @@ impl Header {
         };
         let origin = self.0.value("space origin", "a vector (x,y,z)", |text| text.map_or(Some(DVec3::ZERO), vector))?;
         let axes = DMat3::from_diagonal(ras_from_space) * axes;
-        Ok(Some(Orientation { axes, origin: ras_from_space * origin }))
+        Ok(Some(Orientation { axes, origin: ras_from_space * factors * origin }))
     }
 
     /// The data files; `None` if the samples are in the header's own file.
@@ -407,7 +465,19 @@ fn is_list(value: &str) -> bool {
     value.split_whitespace().next() == Some("LIST")
 }
 
-/// Three vectors `(x,y,z)`, with or without spaces between them.
-fn vectors(text: &str) -> Option<[DVec3; 3]> {
-    three(text.split_inclusive(')').map(vector))
+/// Vectors `(x,y,z)`, with or without spaces in and between them, and words such as `none`.
+fn vector_words(text: &str) -> Vec<&str> {
+    let mut words = Vec::new();
+    let mut rest = text.trim_start();
+    while !rest.is_empty() {
+        let end = if rest.starts_with('(') {
+            rest.find(')').map(|at| at + 1)
+        } else {
+            rest.find(|c: char| c.is_ascii_whitespace() || c == '(')
+        };
+        let (word, after) = rest.split_at(end.unwrap_or(rest.len()));
+        words.push(word);
+        rest = after.trim_start();
+    }
+    words
 }

@@ -9,7 +9,7 @@ use super::access::{Access, ReadOptions};
 use super::error::volume::{VolumeError, invalid, refused};
 use super::format;
 use super::loaded::{Levels, Loaded};
-use super::store::{Store, StoreFacts, facts_of_channel};
+use super::store::{Store, StoreFacts};
 use super::texel::COLOR_BYTES;
 use super::values::Values;
 use super::volume::Volume;
@@ -18,7 +18,7 @@ impl Volume {
     /// Reads a volume file. Its first bytes determine the format, or else its extension: NRRD (`.nrrd`, `.nhdr`), and, each with the
     /// feature of its name, NIfTI (`.nii`, `.hdr`, `.img`, also with `.gz`), MGH (`.mgh`, `.mgz`), MetaImage (`.mha`, `.mhd`), NPY
     /// (`.npy`) and its archives (`.npz`: their only array, or the one named as in `file.npz:name`), TIFF (`.tif`, `.tiff`), DICOM
-    /// (`.dcm`), VTK (`.vti`, `.vtk`) and Zarr (folders, and archives `.zip` and `.ozx`). The path may also be a folder of slices: TIFF files of one page,
+    /// (`.dcm`), VTK (`.vti`, `.vtr`, `.vtk`) and Zarr (folders, and archives `.zip` and `.ozx`). The path may also be a folder of slices: TIFF files of one page,
     /// or DICOM files, of whose series the largest is read, or that of [`ReadOptions::series`].
     ///
     /// # Errors
@@ -42,11 +42,12 @@ impl Volume {
         let first_channel = access.selection().channel.unwrap_or(0) as usize;
         let channels = first_channel..(loaded.series.channels as usize).max(first_channel + 1);
         let facts: Vec<StoreFacts> =
-            channels.enumerate().map(|(at, channel)| facts_of_channel(loaded.facts(format, channel), at)).collect();
+            channels.enumerate().map(|(at, channel)| loaded.facts(format, channel, at)).collect();
         let mut facts = facts.into_iter();
         let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();
-        let spacing = spacing.unwrap_or(DVec3::ONE);
+        let spacing = access.spacing().or(spacing).unwrap_or(DVec3::ONE);
+        access.take_rounding().warn(path, sample_type, values.as_slice());
         if series.is_color {
             let bytes = COLOR_BYTES * u64::from(dims.element_product());
             access.reserve(path, "data", format!("{dims} voxels with colours"), bytes)?;
@@ -67,6 +68,7 @@ impl Volume {
         let mut first = channel(values)?;
         let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
         if let Some(Levels { dims, level, grid, reads }) = levels {
+            let grid = access.spacing().map_or(grid, |spacing| grid.with_finest_spacing(spacing));
             grid.check().map_err(|error| refused(&origin, error))?;
             (first.grid, first.levels, first.level, first.reads) = (grid, dims, level, Some(reads));
         }

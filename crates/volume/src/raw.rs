@@ -61,6 +61,7 @@ impl Volume {
         stream.skip(offset)?;
         let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
         let values = stream.samples::<f32>(&samples, false)?;
+        access.take_rounding().warn(path, kind, values.as_slice());
         let volume = Self::from_values(&path.display().to_string(), dims, DVec3::ONE, values)?;
         Ok(Self { encoding: Some(Encoding { format: FORMAT, sample_type: kind, channels: 1, times: 1 }), ..volume })
     }

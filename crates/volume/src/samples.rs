@@ -8,6 +8,7 @@ use glam::{DVec3, UVec3, Vec3Swizzles};
 
 use super::error::volume::{VolumeError, invalid};
 use super::grid::Grid;
+use super::rounding::Rounding;
 use super::sample_type::{Sample, SampleType, for_sample_type};
 use super::voxel::{Many, Voxel};
 
@@ -57,25 +58,31 @@ impl Samples {
         Ok(sorted)
     }
 
-    /// Converts all of `bytes` and appends the voxels to `into`, which holds those before.
-    pub(super) fn append<T: Voxel>(&self, path: &Path, bytes: &[u8], into: &mut T::Many) -> Result<(), VolumeError> {
+    /// Converts all of `bytes` and appends the voxels to `into`, which holds those before. Returns what they lose.
+    pub(super) fn append<T: Voxel>(
+        &self,
+        path: &Path,
+        bytes: &[u8],
+        into: &mut T::Many,
+    ) -> Result<Rounding, VolumeError> {
+        let mut rounding = Rounding::default();
         let mut voxels = Vec::new();
         for bytes in bytes.chunks(BLOCK * self.kind.bytes() as usize) {
             voxels.clear();
-            self.convert::<T>(path, bytes, &mut voxels, into.count())?;
+            rounding = rounding.max(self.convert::<T>(path, bytes, &mut voxels, into.count())?);
             into.append(&voxels).map_err(self.too_many(path))?;
         }
-        Ok(())
+        Ok(rounding)
     }
 
-    /// Converts all of `bytes` and appends the voxels to `into`, in front of which there are some others.
+    /// Converts all of `bytes` and appends the voxels to `into`, in front of which there are some others. Returns what they lose.
     pub(super) fn convert<T: Voxel>(
         &self,
         path: &Path,
         bytes: &[u8],
         into: &mut Vec<T>,
         before: usize,
-    ) -> Result<(), VolumeError> {
+    ) -> Result<Rounding, VolumeError> {
         into.try_reserve(bytes.len() / self.kind.bytes() as usize).map_err(self.too_many(path))?;
         self.kind.convert(self, bytes, into).map_err(|sample| {
             let voxel = self.voxel_at(before + into.len());
@@ -94,8 +101,9 @@ impl Samples {
 }
 
 impl SampleType {
-    /// Appends the samples in `bytes`, a whole number of them. Stops at a sample that is not allowed and returns it as the error.
-    pub(super) fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<(), f64> {
+    /// Appends the samples in `bytes`, a whole number of them, and returns what they lose. Stops at a sample that is not allowed and returns it as the
+    /// error.
+    pub(super) fn convert<T: Voxel>(self, layout: &Samples, bytes: &[u8], into: &mut Vec<T>) -> Result<Rounding, f64> {
         let mut swapped = Vec::new();
         let mut bytes = bytes;
         if layout.big_endian {
@@ -115,14 +123,14 @@ impl SampleType {
     }
 }
 
-fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S>, into: &mut Vec<T>) -> Result<(), f64> {
+fn append<S: Sample, T: Voxel>(samples: impl Iterator<Item = S> + Clone, into: &mut Vec<T>) -> Result<Rounding, f64> {
     if T::HOLDS_ALL {
         // Without a test of each, several are converted at a time.
-        into.extend(samples.map(|sample| T::of(sample).unwrap_or(T::HOLE)));
-        return Ok(());
+        into.extend(samples.clone().map(|sample| T::of(sample).unwrap_or(T::HOLE)));
+        return Ok(if S::MAY_ROUND { Rounding::of(samples) } else { Rounding::default() });
     }
     for sample in samples {
         into.push(T::of(sample).ok_or_else(|| sample.to_f64())?);
     }
-    Ok(())
+    Ok(Rounding::default())
 }

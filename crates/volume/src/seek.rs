@@ -13,7 +13,7 @@ use super::loaded::Loaded;
 use super::located::Located;
 use super::samples::Samples;
 use super::series::SeriesOrder;
-use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel, values_of};
+use super::store::{Store, StoreLevel, check_box, check_chunk, values_of};
 use super::texel::{COLOR_BYTES, luminance, texel};
 use super::voxel::Voxel;
 use super::{Grid, StoreFacts, Texel, VolumeError};
@@ -61,7 +61,7 @@ impl FileStore {
         let channels = series.channels(access.selection());
         let of_stores = if series.is_color { vec![channels] } else { channels.map(|of| of..of + 1).collect() };
         let store = |(at, components): (usize, Range<u32>)| {
-            let facts = facts_of_channel(loaded.facts(format, components.start as usize), at);
+            let facts = loaded.facts(format, components.start as usize, at);
             // Colours are their own palette.
             let of_color = StoreFacts { palette: None, channel_name: None, display: None, ..facts.clone() };
             let facts = if series.is_color { of_color } else { facts };
@@ -144,7 +144,7 @@ impl FileStore {
                     return Err(invalid(path, "data", found, "the whole file"));
                 };
                 row_samples.clear();
-                samples.convert::<f32>(path, code, &mut row_samples, 0)?;
+                self.access.note_rounding(samples.convert::<f32>(path, code, &mut row_samples, 0)?);
                 row(first, &row_samples);
             }
         }
@@ -186,13 +186,15 @@ impl Store for FileStore {
             return self.read_colors(level, from, dims, values, &mut vec![Texel::default(); values.len()]);
         }
         check_box(&self.located.path, &self.levels, level, (from, dims), values.len())?;
-        self.read_rows((from, dims), (self.firsts[0], 1), |first, samples| {
+        let bytes = self.read_rows((from, dims), (self.firsts[0], 1), |first, samples| {
             let row = &mut values[first..first + dims.x as usize];
             match self.step {
                 1 => row.copy_from_slice(samples),
                 step => row.iter_mut().zip(samples.iter().step_by(step as usize)).for_each(|(to, &from)| *to = from),
             }
-        })
+        })?;
+        self.access.warn_of_box(&self.located.path, self.located.samples.kind, values);
+        Ok(bytes)
     }
 
     fn has_colors(&self) -> bool {

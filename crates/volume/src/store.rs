@@ -134,14 +134,6 @@ impl StoreLevel {
     }
 }
 
-/// What a file states about one of its channels, given its number among those that are read: what concerns all of them is the first one's.
-pub(super) fn facts_of_channel(facts: StoreFacts, number: usize) -> StoreFacts {
-    match number {
-        0 => facts,
-        _ => StoreFacts { palette: None, label_names: BTreeMap::new(), orientation: None, ..facts },
-    }
-}
-
 /// Checks that a box lies in a level, and that there is a value for each of its voxels.
 pub(super) fn check_box(
     path: &Path,

@@ -184,7 +184,7 @@ impl Stream {
             if read < wanted {
                 return Err(samples.mismatch(&path, samples.bytes() - left + read));
             }
-            samples.append::<T>(&path, &chunk, &mut values)?;
+            self.access.note_rounding(samples.append::<T>(&path, &chunk, &mut values)?);
             left -= read;
         }
         values.shrink_to_fit();

@@ -7,9 +7,9 @@ use super::voxel::{Many, Voxel};
 /// Distances up to this many of the smallest count as equal to it.
 const ALIKE: f64 = 1.1;
 /// Even places closer to a sample than this fraction of their distance are the sample's own.
-const SAME_PLACE: f64 = 0.01;
+pub(super) const SAME_PLACE: f64 = 0.01;
 /// The maximum ratio of even places to samples.
-const MAX_GROWTH: f64 = 4.0;
+pub(super) const MAX_GROWTH: f64 = 4.0;
 
 /// Even places along an axis, as positions among uneven samples.
 #[derive(Debug, PartialEq)]
@@ -56,6 +56,7 @@ impl Even {
     }
 
     /// The places, each moved to the nearest sample.
+    #[cfg(feature = "dicom")]
     pub(super) fn nearest(self) -> Self {
         let places = self.places.into_iter().map(|(at, part)| (at + usize::from(part >= 0.5), 0.0)).collect();
         Self { places, ..self }

@@ -19,6 +19,7 @@ use sheetsplat::volume::{self, Orientation, ReadOptions, StreamedVolume, Volume}
 use crate::failure::Failure;
 use crate::outputs::Outputs;
 use crate::reading::Reading;
+use crate::stdin;
 
 /// The flags that set keys of the scene, in the order in which they are applied.
 const FLAGS: [(&str, &str); 15] = [
@@ -42,7 +43,8 @@ const FLAGS: [(&str, &str); 15] = [
 /// The scene to draw, and the adapter.
 #[derive(clap::Args)]
 pub(crate) struct Input {
-    /// A scene file (.toml), a volume file, the address of a Zarr store (http:// or https://), or builtin:NAME[:N].
+    /// A scene file (.toml), a volume file, the address of a Zarr store (http:// or https://), builtin:NAME[:N], or - for a volume file from standard input,
+    /// of a format that its first bytes tell and whose header names no other file.
     #[arg(value_name = "INPUT")]
     pub(crate) name: String,
     /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
@@ -191,6 +193,9 @@ impl Input {
     pub(crate) fn options(&self) -> ReadOptions {
         let mut options = self.reading.options();
         options.index.clone_from(&self.index);
+        if self.name == stdin::NAME {
+            options.files = Some(stdin::file(options.memory_limit()));
+        }
         options
     }
 

@@ -22,6 +22,7 @@ mod parts;
 mod progress;
 mod reading;
 mod render;
+mod stdin;
 mod stdout;
 mod sweep;
 #[cfg(feature = "viewer")]

@@ -384,7 +384,7 @@ impl Pixels {
             SampleType::I16 => make!(i16),
             SampleType::U32 => make!(u32),
             SampleType::I32 => make!(i32),
-            SampleType::U64 | SampleType::I64 | SampleType::F32 | SampleType::F64 => {}
+            SampleType::U64 | SampleType::I64 | SampleType::F16 | SampleType::F32 | SampleType::F64 => {}
         }
     }
 }

@@ -34,7 +34,7 @@ use super::VolumeError;
 use super::access::Access;
 use super::error::volume::invalid;
 use super::grid::{SIZES, dims_of};
-use super::loaded::Loaded;
+use super::loaded::{Legend, Loaded};
 use super::orientation::{Orientation, RAS_FROM_LPS};
 use super::samples::Samples;
 use super::series::apart;
@@ -103,7 +103,7 @@ fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Lo
                 let big_endian = cfg!(target_endian = "big");
                 let samples =
                     Samples { kind: image.kind(), dims, big_endian, rescale: rescale_of(slice), z_fastest: false };
-                samples.append::<T>(&image.path, &frame?, &mut values)?;
+                access.note_rounding(samples.append::<T>(&image.path, &frame?, &mut values)?);
             }
         }
     }
@@ -155,7 +155,7 @@ fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Lo
         unit,
         value_unit,
         orientation,
-        palette,
+        legends: vec![Legend::of_palette(palette)],
         series,
         channel_names,
         time_names,

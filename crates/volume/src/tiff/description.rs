@@ -2,12 +2,14 @@
 
 use ::tiff::tags::Tag;
 
+use glam::DVec3;
+
 use super::super::VolumeError;
 use super::super::display::ChannelDisplay;
 use super::super::fields::Fields;
 use super::super::series::MAX_CHANNELS;
 use super::super::text::number;
-use super::super::unit::unit;
+use super::super::unit::{shared, unit};
 use super::calibration::Calibration;
 use super::display;
 use super::ome;
@@ -91,17 +93,18 @@ impl Calibration {
             }
         }
         let units = ["unit", "yunit", "zunit"].map(|name| fields.get(name));
-        let along_x = units[0].and_then(unit);
-        if units[1..].iter().flatten().any(|&other| unit(other) != along_x) {
-            let found = units.map(|unit| unit.unwrap_or("unit's")).join(", ");
-            return Err(fields.invalid("unit, yunit, zunit", found, "one unit for all"));
-        }
         // ImageJ ignores the sign of the spacing.
-        let between = fields.value("spacing", "a finite number other than 0", |text| match text {
+        let between = fields.value("spacing", "a finite number", |text| match text {
             None => Some(None),
-            Some(text) => number(text).map(f64::abs).filter(|&spacing| spacing > 0.0).map(Some),
+            // A distance of 0 is none.
+            Some(text) => number(text).map(|spacing| Some(spacing.abs()).filter(|&spacing| spacing > 0.0)),
         })?;
-        let (mut spacing, mut length_unit) = (None, along_x);
+        let sizes = pixels_per_unit(pages).map_or([1.0; 2], |[x, y]| [1.0 / x, 1.0 / y]);
+        // Those along y and z are that along x if they are not stated.
+        let names = units.map(|name| name.or(units[0]));
+        let stated = DVec3::new(sizes[0], sizes[1], between.unwrap_or(1.0));
+        let (mut length_unit, factors) = shared((&pages.path, "unit, yunit, zunit"), stated, names);
+        let mut spacing = None;
         if let Some([x, y]) = pixels_per_unit(pages) {
             let resolution_unit = pages.unsigned::<u16>(Tag::ResolutionUnit)?;
             if length_unit.is_none() {
@@ -112,7 +115,7 @@ impl Calibration {
                 };
             }
             if length_unit.is_some() || resolution_unit == Some(NO_UNIT) {
-                spacing = Some([1.0 / x, 1.0 / y]);
+                spacing = Some([factors.x / x, factors.y / y]);
             }
         }
         if between.is_some() {
@@ -136,7 +139,7 @@ impl Calibration {
             }
         }
         // ImageJ omits a distance of 1.
-        let between_slices = between.or((images > 1).then_some(1.0));
+        let between_slices = between.or((images > 1).then_some(1.0)).map(|z| z * factors.z);
         let stack = Some(stack).filter(|_| is_counted || images > 1);
         let unit = length_unit;
         // ImageJ writes data too large for TIFF as one directory, followed by all slices.

@@ -27,7 +27,7 @@ use super::VolumeError;
 use super::access::Access;
 use super::error::volume::invalid;
 use super::grid::{SIZES, dims_of};
-use super::loaded::Loaded;
+use super::loaded::{Legend, Loaded};
 use super::samples::Samples;
 use super::series::{Series, apart};
 use super::stream::Stream;
@@ -224,7 +224,8 @@ impl<'a, T: Voxel> Slices<'a, T> {
         self.samples(1)?.reserve::<T>(&pages.path, access)?;
         let bytes = pages.bytes()?;
         self.channels[channel].slices.push(slice);
-        samples.append::<T>(&pages.path, &bytes, &mut self.channels[channel].values)
+        access.note_rounding(samples.append::<T>(&pages.path, &bytes, &mut self.channels[channel].values)?);
+        Ok(())
     }
 
     fn finish(mut self, calibration: &Calibration) -> Result<Loaded<T>, VolumeError> {
@@ -258,7 +259,8 @@ impl<'a, T: Voxel> Slices<'a, T> {
         let palette = self.palette.map(|colors| values_of(&colors, self.rescale)).filter(|palette| !palette.is_empty());
         let unit = calibration.unit.clone();
         let (channel_names, displays) = (calibration.channel_names.clone(), calibration.displays.clone());
-        Ok(Loaded { spacing, unit, palette, channel_names, displays, series, ..Loaded::new(dims, kind, all) })
+        let legends = vec![Legend::of_palette(palette)];
+        Ok(Loaded { spacing, unit, legends, channel_names, displays, series, ..Loaded::new(dims, kind, all) })
     }
 }
 

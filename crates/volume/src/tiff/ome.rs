@@ -119,18 +119,28 @@ pub(super) fn read(path: &Path, samples: u32, description: &str) -> Result<Calib
     let runs = Runs::new(&of_own);
     let others = of_others.into_iter().map(|(name, runs)| (name.to_owned(), Runs::new(&runs))).collect();
     let size = |name: &str| {
-        pixels.value(name, "a positive finite number", |text| match text {
+        pixels.value(name, "a positive finite number, or 0", |text| match text {
             None => Some(None),
-            Some(text) => number(text).filter(|&size| size > 0.0).map(Some),
+            // Programs write 0 where they know no size.
+            Some(text) => number(text).filter(|&size| size >= 0.0).map(Some),
         })
     };
-    let [x, y, z] = [size("PhysicalSizeX")?, size("PhysicalSizeY")?, size("PhysicalSizeZ")?];
+    let mut sizes = [size("PhysicalSizeX")?, size("PhysicalSizeY")?, size("PhysicalSizeZ")?];
     let names = ["PhysicalSizeXUnit", "PhysicalSizeYUnit", "PhysicalSizeZUnit"];
     let units = names.map(|name| pixels.get(name).unwrap_or("µm"));
-    let unit = unit::common(units);
-    if units.iter().any(|&other| unit != unit::unit(other)) {
-        return Err(pixels.invalid("PhysicalSizeXUnit, YUnit, ZUnit", units.join(", "), "one unit for all"));
+    // Units of sizes that are not stated do not count.
+    let names = [0, 1, 2].map(|axis| sizes[axis].filter(|&size| size > 0.0).map(|_| units[axis]));
+    let of_units = (path, "PhysicalSizeXUnit, YUnit, ZUnit");
+    let (unit, factors) = unit::shared(of_units, DVec3::from_array(sizes.map(|size| size.unwrap_or(1.0))), names);
+    for (size, factor) in sizes.iter_mut().zip(factors.to_array()) {
+        *size = size.map(|size| size * factor);
     }
+    if sizes.contains(&Some(0.0)) {
+        let open = sizes.map(|size| size.unwrap_or_default());
+        let known = unit::known((path, "PhysicalSizeX, Y, Z"), open);
+        sizes = known.map_or([None; 3], |known| known.to_array().map(Some));
+    }
+    let [x, y, z] = sizes;
     let spacing = x.zip(y).map(|(x, y)| [x, y]);
     let unit = unit.filter(|_| spacing.is_some());
     // White is what a file states that states nothing.

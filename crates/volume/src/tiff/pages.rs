@@ -13,7 +13,6 @@ use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::display::ChannelDisplay;
 use super::super::error::volume::{invalid, io_error};
-use super::super::half;
 use super::super::sample_type::SampleType;
 use super::directory::{descriptions, low_byte_of, most_values, overlong_entry};
 use super::display;
@@ -45,7 +44,7 @@ pub(super) struct Page {
     pub(super) samples: u32,
     /// The type of the samples that become values.
     pub(super) kind: SampleType,
-    /// The bits of a sample in the file: 16 of floats that become `f32`, and 1 of whether a pixel is set.
+    /// The bits of a sample in the file: those of the type, or 1 of whether a pixel is set.
     bits: u32,
 }
 
@@ -59,15 +58,12 @@ impl Page {
 
     /// The samples that become values.
     fn unpacked(self, bytes: Vec<u8>) -> Vec<u8> {
-        match (self.bits, self.kind) {
-            (16, SampleType::F32) => half::widen(&bytes),
-            (1, _) => {
-                let width = self.size[0] as usize;
-                let row = |row: &[u8]| (0..width).map(|x| row[x / 8] >> (7 - x % 8) & 1).collect::<Vec<u8>>();
-                bytes.chunks(width.div_ceil(8)).flat_map(row).collect()
-            }
-            _ => bytes,
+        if self.bits > 1 {
+            return bytes;
         }
+        let width = self.size[0] as usize;
+        let row = |row: &[u8]| (0..width).map(|x| row[x / 8] >> (7 - x % 8) & 1).collect::<Vec<u8>>();
+        bytes.chunks(width.div_ceil(8)).flat_map(row).collect()
     }
 
     pub(super) fn bytes(self) -> u64 {
@@ -90,10 +86,9 @@ impl Display for Page {
         let [width, height] = self.size;
         let colors = if self.samples > 1 { format!(" colours of {}", self.samples) } else { String::new() };
         write!(f, "{width} × {height}{colors} ")?;
-        match (self.bits, self.kind) {
-            (1, _) => f.write_str("bits"),
-            (16, SampleType::F32) => f.write_str("float16"),
-            (_, kind) => kind.fmt(f),
+        match self.bits {
+            1 => f.write_str("bits"),
+            _ => self.kind.fmt(f),
         }
     }
 }
@@ -404,7 +399,7 @@ impl Pages {
             self.decoder.read_image_bytes(&mut bytes).map_err(failed(&self.path, &name))?;
         }
         if self.unsigned::<u16>(Tag::PhotometricInterpretation)? == Some(WHITE_IS_ZERO) {
-            if matches!(self.page.kind, SampleType::F32 | SampleType::F64) {
+            if matches!(self.page.kind, SampleType::F16 | SampleType::F32 | SampleType::F64) {
                 let allowed = "BlackIsZero, for floats";
                 return Err(invalid(&self.path, "PhotometricInterpretation", "WhiteIsZero", allowed));
             }
@@ -453,7 +448,8 @@ fn sample_type_of(sample_type: DecodingSampleType) -> SampleType {
         DecodingSampleType::I16 => SampleType::I16,
         DecodingSampleType::I32 => SampleType::I32,
         DecodingSampleType::I64 => SampleType::I64,
-        DecodingSampleType::F16 | DecodingSampleType::F32 => SampleType::F32,
+        DecodingSampleType::F16 => SampleType::F16,
+        DecodingSampleType::F32 => SampleType::F32,
         DecodingSampleType::F64 => SampleType::F64,
     }
 }

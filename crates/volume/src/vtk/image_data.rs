@@ -1,4 +1,4 @@
-//! XML ImageData of one piece. The samples are in the XML as text or base64, or appended after it as base64 or raw bytes, optionally in
+//! XML ImageData or RectilinearGrid of one piece. The samples are in the XML as text or base64, or appended after it as base64 or raw bytes, optionally in
 //! blocks compressed by zlib or LZ4.
 
 use std::io::{self, BufRead, Read, Seek, SeekFrom};
@@ -22,10 +22,15 @@ use super::super::samples::Samples;
 use super::super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::super::stream::Stream;
 use super::super::text::{number, three};
+use super::super::unit;
 use super::super::voxel::Voxel;
 use super::super::xml;
 use super::blocks::{Base64, Blocks, Compressor, HeaderType};
 use super::choice::warn_of_choice;
+use super::rectilinear::{Coordinates, resampled};
+
+/// The files that are read.
+const ALLOWED: &str = "an XML file of VTK with ImageData or RectilinearGrid";
 
 const TYPES: [(&str, SampleType); 10] = [
     ("Int8", SampleType::I8),
@@ -43,21 +48,12 @@ const TYPES: [(&str, SampleType); 10] = [
 /// Reads the array of one file.
 pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let header = Header::read(path, access)?;
-    let spacing = header.spacing()?;
-    header.check_direction()?;
+    if !header.is_rectilinear {
+        header.check_direction()?;
+    }
     let array = header.choose()?;
     let dims = header.dims(array)?;
-    let kind = array.fields.value("type", &TYPES.map(|(name, _)| name).join(", "), |text| {
-        TYPES.iter().find(|(name, _)| Some(*name) == text).map(|&(_, kind)| kind)
-    })?;
-    let big_endian = header.file.value("byte_order", "LittleEndian or BigEndian", |text| match text {
-        None | Some("LittleEndian") => Some(false),
-        Some("BigEndian") => Some(true),
-        Some(_) => None,
-    })?;
-    // Text has no byte order: numbers come from it in the machine's.
-    let big_endian = if array.is_text() { cfg!(target_endian = "big") } else { big_endian };
-    let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
+    let samples = header.samples(array, dims)?;
     let channels = array.components().unwrap_or(1);
     let series = Series { channels, order: SeriesOrder::Interleaved, ..Series::default() };
     let Some(side) = dims_of([u64::from(dims.x) * u64::from(channels), dims.y.into(), dims.z.into()]) else {
@@ -66,14 +62,23 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
     };
     let stream = header.open(path, access, array, &Samples { dims: side, ..samples })?;
     let values = stream.series::<T>(&samples, &series, false)?;
-    Ok(Loaded { spacing: Some(spacing), series, ..Loaded::new(dims, kind, values) })
+    let loaded = Loaded { series, ..Loaded::new(dims, samples.kind, values) };
+    if header.is_rectilinear {
+        let coordinates = header.coordinates(path, access, array.of_cells)?;
+        return resampled(path, coordinates, loaded, access);
+    }
+    Ok(Loaded { spacing: Some(header.spacing()?), ..loaded })
 }
 
 /// The elements that are needed, as their attributes.
 struct Header {
     file: Fields,
     image: Fields,
+    /// Whether the image is a RectilinearGrid.
+    is_rectilinear: bool,
     arrays: Vec<Array>,
+    /// The arrays of coordinates.
+    coordinates: Vec<Array>,
     /// The attributes of the appended data, and the position where it begins.
     appended: Option<(Fields, u64)>,
 }
@@ -92,7 +97,8 @@ impl Header {
     fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let mut reader = Reader::from_reader(access.open(path)?.reader);
         let (mut file, mut image, mut piece) = (None, None, None);
-        let (mut arrays, mut appended) = (Vec::new(), None);
+        let (mut arrays, mut coordinates, mut appended) = (Vec::new(), Vec::new(), None);
+        let mut in_coordinates = false;
         let mut section: Option<(bool, Option<String>)> = None;
         // The names of active arrays in the sections.
         let mut active_names = Vec::new();
@@ -105,23 +111,30 @@ impl Header {
                     section = None;
                     continue;
                 }
+                Event::End(end) if end.name().as_ref() == "Coordinates" => {
+                    in_coordinates = false;
+                    continue;
+                }
                 Event::End(end) if end.name().as_ref() == "VTKFile" => break,
                 Event::Eof => {
-                    let allowed = "an XML file of VTK with ImageData";
-                    return Err(invalid(path, "header", "the end of the file", allowed));
+                    return Err(invalid(path, "header", "the end of the file", ALLOWED));
                 }
                 _ => continue,
             };
             let fields = xml::attributes(path, &element)?;
             match (element.name().as_ref(), &section) {
                 ("VTKFile", _) => file = file.or(Some(fields)),
-                ("ImageData", _) => image = image.or(Some(fields)),
+                ("ImageData" | "RectilinearGrid", _) => image = image.or(Some(fields)),
                 ("Piece", _) if piece.is_some() => return Err(invalid(path, "Piece", "more than one", "one")),
                 ("Piece", _) => piece = Some(fields),
                 (name @ ("PointData" | "CellData"), _) => {
                     let active = fields.get("Scalars").map(str::to_owned);
                     active_names.extend(active.clone());
                     section = Some((name == "CellData", active));
+                }
+                ("Coordinates", _) => in_coordinates = true,
+                ("DataArray", _) if in_coordinates => {
+                    coordinates.push(Array { is_active: false, of_cells: false, at: reader.buffer_position(), fields });
                 }
                 ("DataArray", Some((of_cells, active))) => arrays.push(Array {
                     is_active: active.is_some() && fields.get("Name") == active.as_deref(),
@@ -138,9 +151,13 @@ impl Header {
                 _ => {}
             }
         }
-        let missing = |element: &str| invalid(path, element, "no such element", "an XML file of VTK with ImageData");
+        let missing = |element: &str| invalid(path, element, "no such element", ALLOWED);
         let file = file.ok_or_else(|| missing("VTKFile"))?;
-        file.value("type", "ImageData", |text| (text? == "ImageData").then_some(()))?;
+        let is_rectilinear = file.value("type", "ImageData or RectilinearGrid", |text| match text? {
+            "ImageData" => Some(false),
+            "RectilinearGrid" => Some(true),
+            _ => None,
+        })?;
         let image = image.ok_or_else(|| missing("ImageData"))?;
         let (whole, part) =
             (extent(&image, "WholeExtent")?, extent(&piece.ok_or_else(|| missing("Piece"))?, "Extent")?);
@@ -151,13 +168,56 @@ impl Header {
         if let Some(name) = active_names.iter().find(|name| !has_array(name)) {
             return Err(image.invalid("Scalars", name, "the name of an array that is there"));
         }
-        Ok(Self { file, image, arrays, appended })
+        Ok(Self { file, image, is_rectilinear, arrays, coordinates, appended })
+    }
+
+    /// How the samples of an array are stored.
+    fn samples(&self, array: &Array, dims: UVec3) -> Result<Samples, VolumeError> {
+        let kind = array.fields.value("type", &TYPES.map(|(name, _)| name).join(", "), |text| {
+            TYPES.iter().find(|(name, _)| Some(*name) == text).map(|&(_, kind)| kind)
+        })?;
+        let big_endian = self.file.value("byte_order", "LittleEndian or BigEndian", |text| match text {
+            None | Some("LittleEndian") => Some(false),
+            Some("BigEndian") => Some(true),
+            Some(_) => None,
+        })?;
+        // Text has no byte order: numbers come from it in the machine's.
+        let big_endian = if array.is_text() { cfg!(target_endian = "big") } else { big_endian };
+        Ok(Samples { kind, dims, big_endian, rescale: None, z_fastest: false })
+    }
+
+    /// The coordinates of the points along each axis, or of the centres of cells.
+    fn coordinates(&self, path: &Path, access: &Access, of_cells: bool) -> Result<[Coordinates; 3], VolumeError> {
+        let extent = extent(&self.image, "WholeExtent")?;
+        let found = format!("{} arrays", self.coordinates.len());
+        let [x, y, z] = self.coordinates.as_slice() else {
+            return Err(invalid(path, "Coordinates", found, "three arrays, along x, y and z"));
+        };
+        let along = |axis: usize, array: &Array| {
+            // The values have been read, so that it is small enough.
+            let count = (extent[2 * axis + 1] - extent[2 * axis] + 1) as u32;
+            let name = format!("Coordinates of {}", ["x", "y", "z"][axis]);
+            if array.components() != Some(1) {
+                return Err(invalid(path, &name, "an array of several components", "one number for each point"));
+            }
+            let samples = self.samples(array, UVec3::new(count, 1, 1))?;
+            access.reserve(path, &name, format!("{count} numbers"), 2 * samples.bytes())?;
+            let mut bytes = Vec::new();
+            let read = self.open(path, access, array, &samples)?.read_up_to(samples.bytes(), &mut bytes)?;
+            if read < samples.bytes() {
+                let allowed = format!("{} bytes ({count} numbers of type {})", samples.bytes(), samples.kind);
+                return Err(invalid(path, &name, format!("{read} bytes"), allowed));
+            }
+            let coordinates = Coordinates { name, places: samples.kind.numbers(&bytes, samples.big_endian) };
+            Ok(if of_cells { coordinates.of_cells() } else { coordinates })
+        };
+        Ok([along(0, x)?, along(1, y)?, along(2, z)?])
     }
 
     fn spacing(&self) -> Result<DVec3, VolumeError> {
-        self.image.value("Spacing", "three positive finite numbers", |text| {
+        self.image.value("Spacing", "three positive finite numbers, or 0", |text| {
             let spacing = three(text.unwrap_or("1 1 1").split_whitespace().map(number))?;
-            spacing.iter().all(|&spacing| spacing > 0.0).then_some(DVec3::from_array(spacing))
+            unit::known((&self.image.path, "Spacing"), spacing)
         })
     }
 

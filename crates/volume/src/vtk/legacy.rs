@@ -17,7 +17,12 @@ use super::super::samples::Samples;
 use super::super::source::{MAX_HEADER, Source};
 use super::super::stream::Stream;
 use super::super::text::{number, shown, three};
+use super::super::unit;
 use super::super::voxel::Voxel;
+use super::rectilinear::{Coordinates, resampled};
+
+/// The keywords of coordinates.
+const COORDINATES: [&str; 3] = ["X_COORDINATES", "Y_COORDINATES", "Z_COORDINATES"];
 
 /// The keywords that may follow an array.
 const KEYWORDS: &[&str] = &[
@@ -42,6 +47,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
     let mut header = Header::open(path, access)?;
     let array = header.find_array()?;
     let (dims, kind, spacing) = (header.dims(&array)?, array.kind, header.spacing()?);
+    let coordinates = header.coordinates(array.of_cells)?;
     let Header { mut file, is_text, .. } = header;
     let big_endian = !is_text || cfg!(target_endian = "big");
     let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
@@ -52,7 +58,10 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         Stream::raw(file)?
     };
     let loaded = Loaded::new(dims, kind, stream.samples::<T>(&samples, !is_text)?);
-    Ok(Loaded { spacing, ..loaded })
+    match coordinates {
+        Some(coordinates) => resampled(path, coordinates, loaded, access),
+        None => Ok(Loaded { spacing, ..loaded }),
+    }
 }
 
 /// Refuses a file in which anything but another array follows the samples. `left` is the number of bytes from the samples on.
@@ -72,7 +81,10 @@ fn check_rest(path: &Path, access: &Access, left: u64, samples: &Samples) -> Res
 struct Header {
     file: Source,
     is_text: bool,
+    is_rectilinear: bool,
     fields: Fields,
+    /// The coordinates that have been read, in the order x, y, z.
+    places: [Option<Vec<f64>>; 3],
     budget: u64,
 }
 
@@ -94,7 +106,8 @@ impl Header {
         if !magic.starts_with("# vtk DataFile Version") {
             return Err(invalid(path, "magic", shown(&magic), "a first line # vtk DataFile Version"));
         }
-        let mut header = Self { file, is_text: false, fields: Fields::new(path.to_owned()), budget };
+        let (fields, places) = (Fields::new(path.to_owned()), Default::default());
+        let mut header = Self { file, is_text: false, is_rectilinear: false, fields, places, budget };
         let encoding = header.next_word()?.unwrap_or_default();
         header.is_text = match encoding.to_ascii_uppercase().as_str() {
             "ASCII" => true,
@@ -145,8 +158,10 @@ impl Header {
             match (keyword.as_str(), section) {
                 ("DATASET", _) => {
                     let kind = self.word()?;
-                    if !kind.eq_ignore_ascii_case("STRUCTURED_POINTS") {
-                        return Err(self.unknown(&format!("DATASET {kind}")));
+                    self.is_rectilinear = match kind.to_ascii_uppercase().as_str() {
+                        "STRUCTURED_POINTS" => false,
+                        "RECTILINEAR_GRID" => true,
+                        _ => return Err(self.unknown(&format!("DATASET {kind}"))),
                     }
                 }
                 (name @ ("DIMENSIONS" | "SPACING" | "ASPECT_RATIO" | "ORIGIN"), None) => {
@@ -156,6 +171,14 @@ impl Header {
                         return Err(self.fields.invalid(name, shown(&text), "three numbers"));
                     }
                     self.fields.add(name, &text)?;
+                }
+                (name, None) if COORDINATES.contains(&name) => {
+                    let [count, kind] = self.words()?;
+                    let (count, kind) = (self.number(name, &count)?, self.kind(&kind)?);
+                    self.begin_samples()?;
+                    let places = self.numbers(name, kind, count)?;
+                    let axis = COORDINATES.iter().position(|known| *known == name).unwrap_or_default();
+                    self.places[axis] = Some(places);
                 }
                 (name @ ("POINT_DATA" | "CELL_DATA"), _) => {
                     let count = self.word()?;
@@ -167,7 +190,7 @@ impl Header {
                     // The number of components may be missing, so these words are on one line.
                     let line = self.file.line(&mut self.budget)?.unwrap_or_default();
                     let mut words = line.split_whitespace();
-                    let kind = self.kind(words.next().unwrap_or_default())?;
+                    let kind = words.next().unwrap_or_default();
                     let components = words.next().map_or(Ok(1), |number| self.number("SCALARS", number))?;
                     let [lookup_table, _name] = self.words()?;
                     if !lookup_table.eq_ignore_ascii_case("LOOKUP_TABLE") {
@@ -175,16 +198,34 @@ impl Header {
                         return Err(self.fields.invalid("SCALARS", shown(&lookup_table), allowed));
                     }
                     self.begin_samples()?;
-                    if components == 1 {
-                        return Ok(Array { kind, of_cells, count });
+                    if components == 1 && kind != "bit" {
+                        return Ok(Array { kind: self.kind(kind)?, of_cells, count });
                     }
                     self.skip(kind, count.saturating_mul(components))?;
                 }
-                ("VECTORS" | "NORMALS", Some((_, count))) => {
-                    let [_name, kind] = self.words()?;
+                ("VECTORS" | "NORMALS", Some((_, count))) => self.skip_tuples(3, count)?,
+                ("TENSORS", Some((_, count))) => self.skip_tuples(9, count)?,
+                ("TENSORS6", Some((_, count))) => self.skip_tuples(6, count)?,
+                ("GLOBAL_IDS" | "PEDIGREE_IDS", Some((_, count))) => self.skip_tuples(1, count)?,
+                (name @ "TEXTURE_COORDINATES", Some((_, count))) => {
+                    let [_name, components, kind] = self.words()?;
+                    let components = self.number(name, &components)?;
                     self.begin_samples()?;
-                    let kind = self.kind(&kind)?;
-                    self.skip(kind, count.saturating_mul(3))?;
+                    self.skip(&kind, count.saturating_mul(components))?;
+                }
+                // Bytes, or as text fractions of 255.
+                (name @ "COLOR_SCALARS", Some((_, count))) => {
+                    let [_name, components] = self.words()?;
+                    let components = self.number(name, &components)?;
+                    self.begin_samples()?;
+                    self.skip("unsigned_char", count.saturating_mul(components))?;
+                }
+                // The same for red, green, blue and A of each entry.
+                (name @ "LOOKUP_TABLE", _) => {
+                    let [_name, entries] = self.words()?;
+                    let entries = self.number(name, &entries)?;
+                    self.begin_samples()?;
+                    self.skip("unsigned_char", entries.saturating_mul(4))?;
                 }
                 ("FIELD", _) => {
                     let [_name, arrays] = self.words()?;
@@ -199,7 +240,7 @@ impl Header {
     }
 
     fn unknown(&self, found: &str) -> VolumeError {
-        let allowed = "a file of STRUCTURED_POINTS with DIMENSIONS, SPACING, ORIGIN, then POINT_DATA or CELL_DATA with SCALARS or FIELD";
+        let allowed = "a file of STRUCTURED_POINTS with DIMENSIONS, SPACING, ORIGIN, or RECTILINEAR_GRID with DIMENSIONS and coordinates, then POINT_DATA or CELL_DATA with SCALARS or FIELD";
         self.fields.invalid("header", shown(found), allowed)
     }
 
@@ -214,12 +255,13 @@ impl Header {
             }
             let [components, tuples, kind] = self.words()?;
             let (components, tuples) = (self.number(&name, &components)?, self.number(&name, &tuples)?);
-            let kind = self.kind(&kind)?;
             self.begin_samples()?;
-            if let Some((of_cells, count)) = section.filter(|&(_, count)| (components, tuples) == (1, count)) {
-                return Ok(Some(Array { kind, of_cells, count }));
+            let is_wanted = |&(_, count): &(bool, u64)| (components, tuples) == (1, count);
+            let is_number = !["bit", "string", "variant"].contains(&kind.to_ascii_lowercase().as_str());
+            if let Some((of_cells, count)) = section.filter(is_wanted).filter(|_| is_number) {
+                return Ok(Some(Array { kind: self.kind(&kind)?, of_cells, count }));
             }
-            self.skip(kind, components.saturating_mul(tuples))?;
+            self.skip(&kind, components.saturating_mul(tuples))?;
             found += 1;
         }
         Ok(None)
@@ -252,13 +294,24 @@ impl Header {
         })
     }
 
-    /// Skips `samples` samples.
-    fn skip(&mut self, kind: SampleType, samples: u64) -> Result<(), VolumeError> {
+    /// Skips an array of which a name and a type are stated, with as many numbers for each of `count` points or cells.
+    fn skip_tuples(&mut self, numbers: u64, count: u64) -> Result<(), VolumeError> {
+        let [_name, kind] = self.words()?;
+        self.begin_samples()?;
+        self.skip(&kind, count.saturating_mul(numbers))
+    }
+
+    /// Skips `samples` samples of the type with a name. Eight bits are a byte, and a string as text is a word.
+    fn skip(&mut self, kind: &str, samples: u64) -> Result<(), VolumeError> {
+        let bytes = match kind.to_ascii_lowercase().as_str() {
+            "bit" => samples.div_ceil(8),
+            "string" if self.is_text => 0,
+            _ => samples.saturating_mul(self.kind(kind)?.bytes()),
+        };
         let path = &self.file.path;
         let skipped = if self.is_text {
             skip_words(&mut self.file.reader, samples)
         } else {
-            let bytes = samples.saturating_mul(kind.bytes());
             io::copy(&mut self.file.reader.by_ref().take(bytes), &mut io::sink()).map(|skipped| skipped == bytes)
         };
         match skipped.map_err(io_error(path))? {
@@ -268,9 +321,7 @@ impl Header {
     }
 
     fn dims(&self, array: &Array) -> Result<UVec3, VolumeError> {
-        let points: UVec3 = self.fields.value("DIMENSIONS", SIZES, |text| {
-            dims_of(three(text?.split_whitespace().map(|size| size.parse::<u32>().ok()))?)
-        })?;
+        let points = self.points()?;
         // A flat grid has one layer of cells.
         let dims = if array.of_cells { (points - 1).max(UVec3::ONE) } else { points };
         let voxels = u64::from(dims.element_product());
@@ -281,12 +332,62 @@ impl Header {
         Err(self.fields.invalid(name, array.count, format!("{voxels}, as DIMENSIONS says")))
     }
 
+    /// The next numbers, of a header.
+    fn numbers(&mut self, name: &str, kind: SampleType, count: u64) -> Result<Vec<f64>, VolumeError> {
+        if self.is_text {
+            let mut bytes = Vec::new();
+            for _ in 0..count {
+                let word = self.word()?;
+                let allowed = || format!("{count} numbers of type {kind}");
+                kind.parse(&word, &mut bytes).ok_or_else(|| self.fields.invalid(name, shown(&word), allowed()))?;
+            }
+            return Ok(kind.numbers(&bytes, cfg!(target_endian = "big")));
+        }
+        let expected = count.saturating_mul(kind.bytes());
+        if expected > self.budget {
+            return Err(self.fields.invalid(name, count, format!("coordinates of less than {MAX_HEADER} bytes")));
+        }
+        let mut bytes = Vec::new();
+        self.file.reader.by_ref().take(expected).read_to_end(&mut bytes).map_err(io_error(&self.file.path))?;
+        self.budget -= expected;
+        if bytes.len() as u64 != expected {
+            return Err(self.fields.invalid(name, "the end of the file", format!("{count} numbers of type {kind}")));
+        }
+        Ok(kind.numbers(&bytes, true))
+    }
+
+    /// The coordinates of points or cells; `None` if the grid is regular.
+    fn coordinates(&mut self, of_cells: bool) -> Result<Option<[Coordinates; 3]>, VolumeError> {
+        if !self.is_rectilinear {
+            return Ok(None);
+        }
+        let dims = self.points()?.to_array();
+        let mut all = Vec::new();
+        for (axis, name) in COORDINATES.into_iter().enumerate() {
+            let places = self.places[axis].take().unwrap_or_default();
+            if places.len() != dims[axis] as usize {
+                let allowed = format!("{}, as DIMENSIONS says", dims[axis]);
+                return Err(self.fields.invalid(name, format!("{} numbers", places.len()), allowed));
+            }
+            let coordinates = Coordinates { name: name.to_owned(), places };
+            all.push(if of_cells { coordinates.of_cells() } else { coordinates });
+        }
+        Ok(all.try_into().ok())
+    }
+
+    /// The number of points along each axis.
+    fn points(&self) -> Result<UVec3, VolumeError> {
+        self.fields.value("DIMENSIONS", SIZES, |text| {
+            dims_of(three(text?.split_whitespace().map(|size| size.parse::<u32>().ok()))?)
+        })
+    }
+
     fn spacing(&self) -> Result<Option<DVec3>, VolumeError> {
         let names = ["SPACING", "ASPECT_RATIO"];
         let Some(name) = names.into_iter().find(|name| self.fields.get(name).is_some()) else { return Ok(None) };
-        self.fields.value(name, "three positive finite numbers", |text| {
+        self.fields.value(name, "three positive finite numbers, or 0", |text| {
             let spacing = three(text?.split_whitespace().map(number))?;
-            spacing.iter().all(|&spacing| spacing > 0.0).then_some(Some(DVec3::from_array(spacing)))
+            unit::known((&self.fields.path, name), spacing).map(Some)
         })
     }
 }

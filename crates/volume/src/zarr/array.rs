@@ -11,7 +11,6 @@ use serde_json::Value;
 use super::super::VolumeError;
 use super::super::access::Access;
 use super::super::error::volume::invalid;
-use super::super::half;
 use super::super::sample_type::SampleType;
 use super::super::samples::Samples;
 use super::super::voxel::Voxel;
@@ -20,7 +19,6 @@ use super::codec::Codecs;
 use super::json::Json;
 use super::keys::Keys;
 use super::metadata::{self, ChunkKeys, Metadata};
-use super::number::Number;
 use super::shards::{MAX_IN_SHARD, Shards};
 use super::steps::compressed;
 use crate::parallel;
@@ -44,7 +42,6 @@ pub(super) struct ZarrArray {
     shards: Option<Shards>,
     chunk_keys: ChunkKeys,
     axes: Axes,
-    number: Number,
     pub(super) kind: SampleType,
     /// The bytes of the value of voxels in chunks that the store does not hold, and whether the metadata state it.
     fill: Vec<u8>,
@@ -165,7 +162,6 @@ impl ZarrArray {
             shards,
             chunk_keys,
             axes,
-            number,
             kind,
             fill,
             has_fill,
@@ -360,12 +356,11 @@ impl ZarrArray {
 
     /// The voxels of numbers as the store holds them, in the machine's byte order.
     fn convert<T: Voxel>(&self, bytes: Vec<u8>) -> Result<Vec<T>, f64> {
-        let bytes = if self.number == Number::Half { half::widen(&bytes) } else { bytes };
         let big_endian = cfg!(target_endian = "big");
         let dims = UVec3::new((bytes.len() as u64 / self.kind.bytes()) as u32, 1, 1);
         let layout = Samples { kind: self.kind, dims, big_endian, rescale: None, z_fastest: false };
         let mut voxels = Vec::with_capacity(dims.x as usize);
-        self.kind.convert(&layout, &bytes, &mut voxels)?;
+        self.keys.access.note_rounding(self.kind.convert(&layout, &bytes, &mut voxels)?);
         Ok(voxels)
     }
 

@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::super::loaded::Legend;
+
 use super::super::display::ChannelDisplay;
 use super::json::Json;
 
@@ -37,11 +39,8 @@ fn color(text: &str) -> Option<DVec3> {
     Some(DVec3::from([16, 8, 0].map(|shift| f64::from(number >> shift & 0xff) / 255.0)))
 }
 
-/// Colours of values, in ascending order.
-type Palette = Vec<(f64, DVec3)>;
-
 /// The names and colours of labels, as `image-label` states them.
-pub(super) fn labels(image_label: &Json) -> (BTreeMap<u16, String>, Option<Palette>) {
+pub(super) fn labels(image_label: &Json) -> Legend {
     let value = |label: &Json| {
         let number = label.get("label-value").number()?;
         (number.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&number)).then_some(number as u16)
@@ -57,8 +56,8 @@ pub(super) fn labels(image_label: &Json) -> (BTreeMap<u16, String>, Option<Palet
     };
     let names = image_label.get("properties").members().iter().filter_map(name).collect();
     let colors: BTreeMap<u16, DVec3> = image_label.get("colors").members().iter().filter_map(color).collect();
-    let palette: Palette = colors.into_iter().map(|(value, color)| (f64::from(value), color)).collect();
-    (names, Some(palette).filter(|palette| !palette.is_empty()))
+    let palette: Vec<_> = colors.into_iter().map(|(value, color)| (f64::from(value), color)).collect();
+    Legend { names, palette: Some(palette).filter(|palette| !palette.is_empty()) }
 }
 
 #[cfg(test)]

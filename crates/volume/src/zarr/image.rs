@@ -1,6 +1,5 @@
 //! An image of a Zarr store: an OME-Zarr image or label image, or a plain array.
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -13,7 +12,7 @@ use super::super::address::archive_and_inner;
 use super::super::display::ChannelDisplay;
 use super::super::error::volume::{invalid, refused};
 use super::super::grid::{Grid, check_spacing};
-use super::super::loaded::Loaded;
+use super::super::loaded::{Legend, Loaded};
 use super::super::series::{MAX_CHANNELS, Series};
 use super::super::voxel::Voxel;
 use super::array::ZarrArray;
@@ -39,8 +38,7 @@ pub(super) struct Image {
     pub(super) series: Series,
     pub(super) channel_names: Vec<String>,
     pub(super) displays: Vec<ChannelDisplay>,
-    pub(super) label_names: BTreeMap<u16, String>,
-    pub(super) palette: Option<Vec<(f64, DVec3)>>,
+    pub(super) legend: Legend,
     /// The metadata of the image and its levels.
     pub(super) metadata: Vec<Value>,
 }
@@ -123,8 +121,7 @@ impl Image {
             series: self.series,
             channel_names: self.channel_names.clone(),
             displays: self.displays.clone(),
-            label_names: self.label_names.clone(),
-            palette: self.palette.clone(),
+            legends: vec![self.legend.clone()],
             ..Loaded::new(grid.dims, array.kind, values)
         }
     }
@@ -135,9 +132,9 @@ impl Image {
         let grid = Grid::new(array.dims(), DVec3::ONE);
         let levels = vec![Level { array, grid }];
         let metadata = vec![levels[0].array.metadata()];
-        let (channel_names, displays, label_names) = (Vec::new(), Vec::new(), BTreeMap::new());
-        let (unit, palette, series) = (None, None, series_of(&keys, &levels)?);
-        Ok(Self { keys, levels, unit, series, channel_names, displays, label_names, palette, metadata })
+        let (channel_names, displays, legend) = (Vec::new(), Vec::new(), Legend::default());
+        let (unit, series) = (None, series_of(&keys, &levels)?);
+        Ok(Self { keys, levels, unit, series, channel_names, displays, legend, metadata })
     }
 
     /// The image whose levels lie below a group of a store.
@@ -152,7 +149,7 @@ impl Image {
         if all.len() > 1 {
             log::warn!("{}: {} multiscale images: the first is read", node.file.display(), all.len());
         }
-        let multiscale = Multiscale::read(multiscale)?;
+        let multiscale = Multiscale::read(&keys.path, multiscale)?;
         if multiscale.datasets.len() > MAX_LEVELS {
             let found = format!("{} levels", multiscale.datasets.len());
             return Err(invalid(&node.file, "datasets", found, format!("at most {MAX_LEVELS}")));
@@ -190,9 +187,9 @@ impl Image {
             levels.push(Level { array, grid });
         }
         let (channel_names, displays) = display::channels(&ome.get("omero"));
-        let (label_names, palette) = display::labels(&ome.get("image-label"));
+        let legend = display::labels(&ome.get("image-label"));
         let (unit, series) = (multiscale.unit, series_of(&keys, &levels)?);
-        Ok(Self { keys, levels, unit, series, channel_names, displays, label_names, palette, metadata })
+        Ok(Self { keys, levels, unit, series, channel_names, displays, legend, metadata })
     }
 }
 

@@ -22,7 +22,7 @@ pub(super) struct Keys {
     /// The folder, the archive or the address.
     pub(super) path: PathBuf,
     place: Place,
-    access: Access,
+    pub(super) access: Access,
     /// The maximum number of bytes that are read at once.
     limit: AtomicU64,
 }

@@ -33,7 +33,7 @@ use super::access::Access;
 use super::error::volume::invalid;
 use super::grid::{SIZES, dims_of};
 use super::loaded::{Levels, Loaded};
-use super::store::{Store, StoreLevel, check_box, check_chunk, facts_of_channel};
+use super::store::{Store, StoreLevel, check_box, check_chunk};
 use super::voxel::{Many, Voxel};
 use super::{Grid, StoreFacts, Values, VolumeError};
 use crate::StoreCounts;
@@ -146,7 +146,7 @@ pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result
     let stated = Loaded { spacing, ..image.stated::<f32>(0, Values::default()) };
     let time = u64::from(selection.time.unwrap_or(0));
     let store = |(at, channel): (usize, u32)| {
-        let facts = facts_of_channel(stated.facts(format, channel as usize), at);
+        let facts = stated.facts(format, channel as usize, at);
         let (image, levels) = (Arc::clone(&image), levels.clone());
         Arc::new(ZarrStore { image, levels, channel: channel.into(), time, facts }) as Arc<dyn Store>
     };
@@ -171,7 +171,10 @@ impl Store for ZarrStore {
     fn read(&self, level: usize, from: UVec3, dims: UVec3, values: &mut [f32]) -> Result<u64, VolumeError> {
         check_box(&self.image.keys.path, &self.levels, level, (from, dims), values.len())?;
         let region = Region { channels: self.channel..self.channel + 1, time: self.time, from, dims };
-        Ok(self.image.levels[level].array.read(&region, values)?.bytes)
+        let array = &self.image.levels[level].array;
+        let bytes = array.read(&region, values)?.bytes;
+        self.image.keys.access.warn_of_box(&self.image.keys.path, array.kind, values);
+        Ok(bytes)
     }
 
     fn contains(&self, level: usize, chunk: UVec3) -> Result<bool, VolumeError> {

@@ -2,10 +2,12 @@
 //!
 //! This is read from JSON here: `ome_zarr_metadata` tells of a wrong value neither where it stands nor what is allowed, and brings five crates.
 
+use std::path::Path;
+
 use glam::DVec3;
 
 use super::super::VolumeError;
-use super::super::unit::common;
+use super::super::unit;
 use super::axes::{Axes, Axis, KINDS};
 use super::json::Json;
 
@@ -33,19 +35,12 @@ struct Placement([(f64, f64); KINDS]);
 
 impl Multiscale {
     /// Reads the first of an image's `multiscales`, `multiscale`.
-    pub(super) fn read(multiscale: &Json) -> Result<Self, VolumeError> {
+    pub(super) fn read(path: &Path, multiscale: &Json) -> Result<Self, VolumeError> {
         let axes_json = multiscale.get("axes");
         let axes = Axes::read(&axes_json)?;
         let members = axes_json.members();
-        let units: Vec<&str> = SPACE
-            .iter()
-            .filter_map(|&axis| Some(members[axes.of(axis)?].get("unit").text().unwrap_or_default()))
-            .collect();
-        let unit = common(units.iter().copied());
-        if unit.is_none() && units.iter().any(|unit| *unit != units[0]) {
-            return Err(axes_json.invalid("one unit for all axes of space"));
-        }
-        let mut datasets = Vec::new();
+        let units = SPACE.map(|axis| Some(members[axes.of(axis)?].get("unit").text().unwrap_or_default()));
+        let mut datasets: Vec<Dataset> = Vec::new();
         for dataset in multiscale.get("datasets").list("a list of at least one dataset")? {
             let mut placement = Placement([(1.0, 0.0); KINDS]);
             placement.transform(&dataset.get("coordinateTransformations"), &axes)?;
@@ -53,6 +48,11 @@ impl Multiscale {
             let [z, y, x] = [Axis::Z, Axis::Y, Axis::X].map(|axis| placement.0[axis as usize]);
             let (spacing, first) = (DVec3::new(x.0, y.0, z.0), DVec3::new(x.1, y.1, z.1));
             datasets.push(Dataset { path: path_of(&dataset.get("path"))?, spacing, first });
+        }
+        let finest = datasets.first().map_or(DVec3::ONE, |finest| finest.spacing);
+        let (unit, factors) = unit::shared((path, "axes' units"), finest, units);
+        for Dataset { spacing, first, .. } in &mut datasets {
+            (*spacing, *first) = (*spacing * factors, *first * factors);
         }
         if datasets.is_empty() {
             return Err(multiscale.get("datasets").invalid("a list of at least one dataset"));

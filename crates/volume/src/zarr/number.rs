@@ -2,27 +2,24 @@
 
 use serde_json::Value;
 
-use super::super::half;
 use super::super::sample_type::SampleType;
 
 /// A type of numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Number {
     Bool,
-    Half,
     Sample(SampleType),
 }
 
 impl Number {
     pub(super) fn names() -> String {
-        SampleType::NAMED.map(|(name, _)| name).join(", ") + ", float16, bool"
+        SampleType::NAMED.map(|(name, _)| name).join(", ") + ", bool"
     }
 
     pub(super) fn named(name: &str) -> Option<Self> {
         let sample = || SampleType::NAMED.into_iter().find(|(known, _)| *known == name);
         match name {
             "bool" => Some(Self::Bool),
-            "float16" => Some(Self::Half),
             _ => sample().map(|(_, kind)| Self::Sample(kind)),
         }
     }
@@ -48,7 +45,6 @@ impl Number {
     pub(super) fn kind(self) -> SampleType {
         match self {
             Self::Bool => SampleType::U8,
-            Self::Half => SampleType::F32,
             Self::Sample(kind) => kind,
         }
     }
@@ -57,7 +53,7 @@ impl Number {
     pub(super) fn fills(self) -> String {
         match self {
             Self::Bool => "true or false".to_owned(),
-            Self::Half | Self::Sample(SampleType::F32 | SampleType::F64) => {
+            Self::Sample(SampleType::F16 | SampleType::F32 | SampleType::F64) => {
                 "a number, NaN, Infinity, -Infinity, or 0x and the digits of all bits".to_owned()
             }
             Self::Sample(kind) => format!("a whole number of the type {kind}"),
@@ -82,17 +78,14 @@ impl Number {
     /// The bytes of a number that is written in decimal.
     pub(super) fn parse(self, text: &str) -> Option<Vec<u8>> {
         let mut bytes = Vec::new();
-        match self {
-            Self::Half => bytes.extend(half::of(text.parse().ok()?).to_ne_bytes()),
-            _ => self.kind().parse(text, &mut bytes)?,
-        }
+        self.kind().parse(text, &mut bytes)?;
         Some(bytes).filter(|bytes| self != Self::Bool || bytes[0] < 2)
     }
 
     /// The bytes of a float of which all bits are written as hexadecimal digits.
     fn bits(self, digits: &str) -> Option<Vec<u8>> {
         let (whole, count) = match self {
-            Self::Half => (SampleType::U16, 4),
+            Self::Sample(SampleType::F16) => (SampleType::U16, 4),
             Self::Sample(SampleType::F32) => (SampleType::U32, 8),
             Self::Sample(SampleType::F64) => (SampleType::U64, 16),
             _ => return None,

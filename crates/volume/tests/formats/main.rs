@@ -26,6 +26,7 @@ mod npz;
 mod nrrd;
 mod raw;
 mod refused;
+mod rounding;
 #[cfg(feature = "http")]
 #[path = "../../../../tests/common/http.rs"]
 mod server;
@@ -35,6 +36,7 @@ mod shared;
 mod shear;
 mod tiff;
 mod tiff_planes;
+mod units;
 mod values;
 mod vtk;
 mod zarr;

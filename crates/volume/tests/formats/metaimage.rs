@@ -91,8 +91,9 @@ fn wrong_fields() {
     let types = "MET_LONG_LONG";
     for (line, replacement, field, found, allowed) in [
         ("ObjectType = Image", "ObjectType = Tube", "ObjectType", "Tube", "Image"),
-        ("NDims = 3", "NDims = 4", "NDims", "4", "3"),
-        ("NDims = 3\n", "", "NDims", "no such field", "3"),
+        ("NDims = 3", "NDims = 4", "DimSize", "5 4 3", "a number of times"),
+        ("NDims = 3", "NDims = 5", "NDims", "5", "3 or 4"),
+        ("NDims = 3\n", "", "NDims", "no such field", "3 or 4"),
         ("NDims = 3", "NDims = 3\nElementNumberOfChannels = 3", "data", "120 bytes", "360 bytes"),
         ("NDims = 3", "NDims = 3\nElementNumberOfChannels = 65", "ElementNumberOfChannels", "65", "1 to 64"),
         ("BinaryData = True", "BinaryData = False", "BinaryData", "False", "True"),
@@ -109,7 +110,7 @@ fn wrong_fields() {
         ("LOCAL", "slice%s.raw 1 3 1", "ElementDataFile", "%s", "a pattern with one %d"),
         ("LOCAL", "", "ElementDataFile", "", "LOCAL, the name of one file"),
         ("NDims", "CompressedData = maybe\nNDims", "CompressedData", "maybe", "True or False"),
-        ("NDims", "ElementSpacing = 1 0 1\nNDims", "ElementSpacing", "[1.0, 0.0, 1.0]", "positive"),
+        ("NDims", "ElementSpacing = 1 -1 1\nNDims", "ElementSpacing", "[1.0, -1.0, 1.0]", "positive"),
         ("NDims", "ElementSpacing = 1 nan 1\nNDims", "ElementSpacing", "1 nan 1", "3 of them"),
         ("NDims", "TransformMatrix = 1 0 0 0 1 0\nNDims", "TransformMatrix", "1 0 0 0 1 0", "9 of them"),
         ("NDims", "TransformMatrix = 1 0 0 0.5 1 0 0 0 1\nNDims", "TransformMatrix", "not orthogonal", "orthogonal"),

@@ -73,7 +73,9 @@ fn wrong_fields() {
     refused(4, &[0; 4], "width, height, depth", "[0, 4, 3]", "three positive integers");
     refused(8, &[0xff; 4], "width, height, depth", "[5, -1, 3]", "three positive integers");
     refused(4, &[0x7f, 0xff, 0xff, 0xff].repeat(3), "width, height, depth", "2147483647", "at most 4294967295");
-    refused(16, &[0, 0, 0, 2], "nframes", "2", "1: a volume of one frame");
+    refused(16, &[0; 4], "nframes", "0", "a positive number of frames");
+    refused(16, &[0xff; 4], "nframes", "-1", "a positive number of frames");
+    refused(16, &[0, 0, 1, 0], "data", "bytes", "30720 bytes (256 volumes of 60 samples)");
     refused(20, &[0, 0, 0, 2], "type", "2", "0 (uint8), 1 (int32), 3 (float32), 4 (int16)");
     refused(20, &[0, 0, 0, 3], "data", "", "240 bytes (60 samples of 4)");
     refused(30, &nan, "spacing", "NaN", "finite");

@@ -1,6 +1,6 @@
 //! NPY, as NumPy writes it.
 
-use sheetsplat_volume::{Labels, ReadOptions};
+use sheetsplat_volume::{Labels, ReadOptions, SampleType, open_store};
 
 use crate::*;
 
@@ -19,6 +19,32 @@ fn of_numpy() {
         let volume = open(name);
         assert_eq!((volume.spacing(), volume.orientation()), (DVec3::ONE, None));
     }
+}
+
+/// Numbers of 16 bits in either byte order, which are read by boxes, too, and truth.
+#[test]
+fn halves_and_truth_of_numpy() {
+    for name in ["half.npy", "half-big.npy"] {
+        let volume = open(name);
+        assert_eq!(volume.encoding().unwrap().sample_type, SampleType::F16, "{name}");
+        let mut boxed = vec![0.0; 60];
+        let store = open_store(&fixture(name), &ReadOptions::default()).unwrap();
+        store.read(0, UVec3::ZERO, DIMS, &mut boxed).unwrap();
+        assert_eq!(boxed, values(), "{name}");
+        assert!(Labels::open(&fixture(name)).unwrap().values.iter().map(|&label| f32::from(label)).eq(values()));
+    }
+    let truth = Volume::open(&fixture("bool.npy")).unwrap();
+    let expected: Vec<f32> = values().iter().map(|value| f32::from(value % 3.0 == 0.0)).collect();
+    assert_eq!((truth.dims(), truth.values()), (DIMS, (&expected).into()));
+    // Those that are no whole numbers, infinite or NaN are as NumPy reads them.
+    let bits: [u16; 5] = [0x3555, 0x0001, 0xfbff, 0x7c00, 0x7e00];
+    let header = "{'descr': '>f2', 'fortran_order': False, 'shape': (1, 1, 5), }\n";
+    let data = bits.map(u16::to_be_bytes).concat();
+    let file = [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header.as_bytes(), &data].concat();
+    let volume = Folder::new().open("a.npy", &file).unwrap();
+    let found = volume.values().to_vec();
+    assert_eq!(found[..3], [0.333_251_95, 5.960_464_5e-8, -65504.0]);
+    assert_eq!(volume.holes(), 2);
 }
 
 #[test]
@@ -100,7 +126,9 @@ fn wrong_headers() {
     let spread = "{ 'shape' : (3,4,5),'fortran_order':False , 'descr' :'<i2'}";
     assert_eq!(folder.open("a.npy", &npy(spread)).unwrap().values(), values());
     for (from, to, field, found, allowed) in [
-        ("<i2", "<f2", "descr", "'<f2'", "f4, f8"),
+        ("<i2", "<f3", "descr", "'<f3'", "f2, f4, f8"),
+        ("<i2", "|f2", "descr", "'|f2'", "'<', '>' or '|'"),
+        ("<i2", "|b2", "descr", "'|b2'", "b1, i1"),
         ("<i2", "|i2", "descr", "'|i2'", "'<', '>' or '|'"),
         ("<i2", "<c8", "descr", "'<c8'", "f4, f8"),
         ("<i2", "", "descr", "''", "f4, f8"),
@@ -135,7 +163,7 @@ fn wrong_headers() {
 
 #[test]
 fn damage() {
-    for name in ["c.npy", "fortran-big.npy", "version2.npy"] {
+    for name in ["c.npy", "fortran-big.npy", "version2.npy", "half.npy", "bool.npy"] {
         let whole = fs::read(fixture(name)).unwrap();
         assert_exact(name, &whole);
     }

@@ -23,7 +23,7 @@ fn assert_holds(volume: &Volume, channels: std::ops::Range<u32>, time: u32, name
 }
 
 /// Files, and how many channels and times they hold.
-const FILES: [(&str, u32, u32); 16] = [
+const FILES: [(&str, u32, u32); 23] = [
     ("channels.npy", 2, 1),
     ("both.npy", 2, 3),
     ("vectors.nrrd", 2, 1),
@@ -40,6 +40,13 @@ const FILES: [(&str, u32, u32); 16] = [
     ("imagej-large.tif", 2, 3),
     ("ome-tczyx.tif", 2, 3),
     ("ome-tzcyx.tif", 2, 3),
+    ("frames.mgz", 1, 3),
+    ("times.mha", 1, 3),
+    ("times-zlib.mha", 1, 3),
+    ("analyze.hdr", 1, 3),
+    ("analyze.img", 1, 3),
+    ("single-first.nrrd", 1, 3),
+    ("single-fourth.nrrd", 2, 1),
 ];
 
 #[test]
@@ -49,7 +56,7 @@ fn all_channels_of_the_first_time() {
         assert_holds(&volume, 0..channels, 0, name);
         let encoding = volume.encoding().unwrap();
         assert_eq!((encoding.channels, encoding.times), (channels, times), "{name}");
-        if name.contains("nrrd") || name.contains("nii") || name.contains("mha") {
+        if ["nrrd", "nii", "mha", "mgz", "analyze"].iter().any(|part| name.contains(part)) {
             volume.channels().for_each(|channel| assert_near(channel.spacing(), SPACING));
         }
         if name.starts_with("ome") {
@@ -89,6 +96,50 @@ fn what_a_file_does_not_hold_is_refused() {
     let single = ReadOptions::default().with_channel(1);
     let message = Volume::open_with(&fixture("c.npy"), &single).unwrap_err().to_string();
     assert!(message.contains("channel: found 1, allowed: 0, the only one"), "{message}");
+}
+
+/// An axis of one sample is left out; without one, five axes are refused.
+#[test]
+fn five_axes_of_nrrd() {
+    let whole = fs::read(path("single-first.nrrd")).unwrap();
+    let text = String::from_utf8_lossy(&whole).into_owned();
+    let with = |from: &str, to: &str| {
+        let at = whole.windows(from.len()).position(|window| window == from.as_bytes()).unwrap();
+        let file = [&whole[..at], to.as_bytes(), &whole[at + from.len()..]].concat();
+        Folder::new().open("a.nrrd", &file)
+    };
+    assert!(text.contains("sizes: 1 5 4 3 3"));
+    assert_refused(with("1 5 4 3 3", "2 5 4 3 3"), "a.nrrd", "sizes", "[2, 5, 4, 3, 3]", "five of which one is 1");
+    assert_refused(with("1 5 4 3 3", "1 5 4 3"), "a.nrrd", "sizes", "1 5 4 3", "5 positive integers");
+    assert_refused(
+        with("none (0.5", "(1,0,0) (0.5").map(drop).and(with("(0,0,3) none", "(0,0,3) (0,0,1)")),
+        "a.nrrd",
+        "space directions",
+        "(0,0,1)",
+        "three vectors",
+    );
+    // Of several axes of one sample that which is not in space is left out, and of others the last.
+    let flat = with("1 5 4 3 3", "1 5 12 1 3").unwrap();
+    assert_eq!((flat.dims(), flat.encoding().unwrap().times), (UVec3::new(5, 12, 1), 3));
+}
+
+/// Analyze 7.5 has no magic, no orientation, and millimetres.
+#[test]
+fn analyze_of_nibabel() {
+    let (volume, warnings) = warned(|| Volume::open(&path("analyze.hdr")).unwrap());
+    assert_eq!((volume.orientation(), volume.unit(), volume.spacing()), (None, Some("mm"), SPACING));
+    assert!(warnings.iter().any(|warning| warning.contains("Analyze 7.5")), "{warnings:?}");
+    // SPM's factor at 112 is the slope, as nibabel reads it.
+    let folder = Folder::new();
+    let (mut header, data) = (fs::read(path("analyze.hdr")).unwrap(), fs::read(path("analyze.img")).unwrap());
+    header[112..116].copy_from_slice(&0.5_f32.to_le_bytes());
+    folder.write("a.img", &[&data]);
+    let halves: Vec<f32> = values().iter().map(|value| 0.5 * value).collect();
+    assert_eq!(folder.open("a.hdr", &header).unwrap().values(), halves);
+    folder.write("a.img", &[&data[1..]]);
+    assert_refused(folder.open("a.hdr", &header), "a.img", "data", "719 bytes", "720 bytes (3 volumes of 60 samples)");
+    // A single file without the magic is nothing.
+    assert_refused(folder.open("a.nii", &header), "a.nii", "magic", "\\xff", "n+1 or ni1");
 }
 
 #[test]

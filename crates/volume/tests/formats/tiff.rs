@@ -98,8 +98,13 @@ fn descriptions_by_image_j() {
     refused("frames=3\nspacing=3\nunit=um", "slices, channels, frames", "3, 1, 3", "product is images");
     let frames = folder.open("a.tif", &with_text("imagej.tif", "slices=3", "frames=3")).unwrap();
     assert_eq!((frames.values(), frames.spacing()), ((&values()).into(), SPACING));
-    refused("zunit=mm\nspacing=3\nunit=um", "unit, yunit, zunit", "um, unit's, mm", "one unit for all");
-    refused("spacing=0\nunit=um", "spacing", "0", "a finite number other than 0");
+    // Lengths are in the finest axis' unit. ImageJ reads a distance of 0 as 1.
+    let (mixed, warnings) = warned(|| open("zunit=mm\nspacing=3\nunit=um").unwrap());
+    assert_near(mixed.spacing(), SPACING.with_z(3000.0));
+    assert_eq!(mixed.unit(), Some("µm"));
+    assert_warned(&warnings, "unit, yunit, zunit: \"um\", \"um\", \"mm\": lengths are converted to µm");
+    assert_eq!(open("spacing=0\nunit=um").unwrap().spacing(), SPACING.with_z(1.0));
+    refused("spacing=x\nunit=um", "spacing", "x", "a finite number");
     refused("cf=0\nc0=-32768\nc1=x\nunit=um", "c1", "x", "a finite number");
     let fewer = folder.open("a.tif", &with_text("imagej.tif", "images=3", "images=4"));
     assert_refused(fewer, "a.tif", "pages", "3", "4, as the description says");
@@ -129,8 +134,15 @@ fn descriptions_by_ome() {
     refused("SizeT=\"1\"", "SizeT=\"7\"", "pages", "3", "21, as the description says");
     refused("SizeC=\"1\"", "SizeC=\"9\"", "pages", "3", "27, as the description says");
     refused("SizeZ=\"3\"", "SizeZ=\"4\"", "pages", "3", "4, as the description says");
-    refused("SizeX=\"0.5\"", "SizeX=\"0.0\"", "PhysicalSizeX", "0.0", "a positive finite number");
-    refused("SizeZUnit=\"µm\"", "SizeZUnit=\"nm\"", "PhysicalSizeXUnit, YUnit, ZUnit", "µm, µm, nm", "one unit");
+    refused("SizeX=\"0.5\"", "SizeX=\"-.5\"", "PhysicalSizeX", "-.5", "a positive finite number, or 0");
+    // An axis without a size has the finest of the others. Lengths are in the finest axis' unit.
+    let (open_x, warnings) = warned(|| open("SizeX=\"0.5\"", "SizeX=\"0.0\"").unwrap());
+    assert_eq!((open_x.spacing(), open_x.unit()), (SPACING.with_x(2.0), Some("µm")));
+    assert_warned(&warnings, "an axis without a spacing is taken to have 2");
+    let (mixed, warnings) = warned(|| open("SizeZUnit=\"µm\"", "SizeZUnit=\"nm\"").unwrap());
+    assert_near(mixed.spacing(), 1000.0 * SPACING.with_z(0.003));
+    assert_eq!(mixed.unit(), Some("nm"));
+    assert_warned(&warnings, "\"µm\", \"µm\", \"nm\": lengths are converted to nm");
     refused("IFD=\"0\"", "IFD=\"1\"", "TiffData", "a slice that is missing or comes twice", "every slice");
     refused("<Pixels ", "<Pixel_ ", "header", "", "well-formed XML");
     assert_eq!(open("PhysicalSizeX", "PhysicalSizeW").unwrap().spacing(), DVec3::ONE);

@@ -113,7 +113,7 @@ fn sets_of_files() {
 fn numbers_of_16_bits_and_of_one() {
     for name in ["half.tif", "half-zlib.tif"] {
         let volume = open(&format!("channels/{name}"));
-        assert_eq!(volume.encoding().unwrap().sample_type, SampleType::F32, "{name}");
+        assert_eq!(volume.encoding().unwrap().sample_type, SampleType::F16, "{name}");
     }
     for name in ["bits.tif", "bits-zlib.tif"] {
         let volume = Volume::open(&fixture(&format!("channels/{name}"))).unwrap();

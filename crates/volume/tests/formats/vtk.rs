@@ -83,7 +83,13 @@ fn wrong_image_data() {
         "[0, 4, 0, 3, 0, 2]",
         "as the whole",
     );
-    refused("Spacing=\"0.5 2 3\"", "Spacing=\"0.5 0 3\"", "Spacing", "0.5 0 3", "three positive finite numbers");
+    refused(
+        "Spacing=\"0.5 2 3\"",
+        "Spacing=\"0.5 -1 3\"",
+        "Spacing",
+        "0.5 -1 3",
+        "three positive finite numbers, or 0",
+    );
     refused("Direction=\"0.6666", "Direction=\"0.7666", "Direction", "not orthogonal", "orthogonal axes");
     refused("Direction=\"0.6666666666666666", "Direction=\"", "Direction", "-0.33", "nine finite numbers");
     refused("<CellData>", "<Piece/><CellData>", "Piece", "more than one", "one");
@@ -192,6 +198,48 @@ fn legacy_headers_are_of_keywords() {
     }
 }
 
+/// Arrays before the first one with one component are skipped by their sizes, which VTK's format of files states.
+#[test]
+fn legacy_arrays_before_the_samples() {
+    let folder = Folder::new();
+    let arrays = [
+        ("TENSORS t float\n", 9 * 60, 4),
+        ("TENSORS6 t double\n", 6 * 60, 8),
+        ("TEXTURE_COORDINATES t 2 float\n", 2 * 60, 4),
+        ("COLOR_SCALARS c 3\n", 3 * 60, 1),
+        ("LOOKUP_TABLE l 7\n", 4 * 7, 1),
+        ("NORMALS n float\n", 3 * 60, 4),
+        ("GLOBAL_IDS i long\n", 60, 8),
+        ("FIELD f 2\na 2 60 short\n", 2 * 60, 2),
+    ];
+    for (array, numbers, bytes) in arrays {
+        let more = |numbers: usize| "1 ".repeat(numbers);
+        let field = if array.starts_with("FIELD") { "b 1 9 int\n1 2 3 4 5 6 7 8 9\n" } else { "" };
+        let text = |numbers: usize| format!("POINT_DATA 60\n{array}{}\n{field}", more(numbers));
+        let open = |numbers| folder.open("a.vtk", &replaced("text.vtk", "POINT_DATA 60\n", &text(numbers)));
+        assert_eq!(open(numbers).unwrap().values(), values(), "{array}");
+        for wrong in [numbers - 1, numbers + 1] {
+            assert!(matches!(open(wrong), Err(VolumeError::Invalid { .. })), "{array}");
+        }
+        // Bytes that would be keywords if they were text.
+        let field = if array.starts_with("FIELD") { [&b"b 1 9 int\n"[..], &[b'S'; 36]].concat() } else { Vec::new() };
+        let whole = fs::read(fixture("binary.vtk")).unwrap();
+        let at = whole.windows(14).position(|window| window == b"POINT_DATA 60\n").unwrap() + 14;
+        let with = |length: usize| {
+            [&whole[..at], array.as_bytes(), &b"SCALARS x ".repeat(1000)[..length], b"\n", &field, &whole[at..]]
+                .concat()
+        };
+        assert_eq!(folder.open("a.vtk", &with(numbers * bytes)).unwrap().values(), values(), "{array}");
+    }
+    // Bits take an eighth of a byte, and strings as text are words.
+    let bits = "POINT_DATA 60\nSCALARS mask bit\nLOOKUP_TABLE default\n".to_owned() + &"0 1 ".repeat(30) + "\n";
+    assert_eq!(folder.open("a.vtk", &replaced("text.vtk", "POINT_DATA 60\n", &bits)).unwrap().values(), values());
+    let names = "POINT_DATA 60\nFIELD f 1\nnames 1 60 string\n".to_owned() + &"a%20b\n".repeat(60);
+    assert_eq!(folder.open("a.vtk", &replaced("text.vtk", "POINT_DATA 60\n", &names)).unwrap().values(), values());
+    let unknown = "POINT_DATA 60\nTENSORS t half\n";
+    refused("text.vtk", "POINT_DATA 60\n", unknown, "type", "half", "char, signed_char");
+}
+
 /// Points may start at any number, but not count down.
 #[test]
 fn extents_may_begin_below_0() {
@@ -227,6 +275,79 @@ fn legacy_samples_and_what_follows() {
     // A long has 8 bytes.
     let types = replaced("binary.vtk", "SCALARS values short", "SCALARS values long");
     assert!(matches!(folder.open("a.vtk", &types), Err(VolumeError::Invalid { field, .. }) if field == "data"));
+}
+
+/// Grids without the row at y = -14.5: between its neighbours lie their means, as VTK's own interpolation has them, and labels are those of a neighbour.
+#[test]
+fn rectilinear_grids() {
+    let files = ["text.vtr", "base64-zlib.vtr", "appended.vtr", "appended-lz4.vtr", "text-grid.vtk", "binary-grid.vtk"];
+    let row = |y: f32, z: f32| (0..5).map(move |x| x as f32 + 10.0 * y + 100.0 * z);
+    let rows = |between: f32| [0.0, 1.0, 2.0, between, 3.0];
+    let slice = |between: f32, z: f32| rows(between).into_iter().flat_map(move |y| row(y, z));
+    let expected = |between: f32| (0..3).flat_map(|z| slice(between, z as f32)).collect::<Vec<f32>>();
+    for name in files {
+        let (volume, warnings) = warned(|| Volume::open(&fixture(name)).unwrap_or_else(|error| panic!("{error}")));
+        assert_eq!((volume.dims(), volume.values()), (UVec3::new(5, 5, 3), (&expected(2.5)).into()), "{name}");
+        assert_near(volume.spacing(), SPACING);
+        assert_warned(&warnings, "distances from 2.0000 to 4.0000: resampled from 4 to 5 samples, 2.0000 apart");
+        let labels = Labels::open(&fixture(name)).unwrap();
+        assert!(labels.values.iter().map(|&label| f32::from(label)).eq(expected(3.0)), "{name}");
+    }
+    // Without uneven places nothing is resampled.
+    let folder = Folder::new();
+    let text = fs::read_to_string(fixture("text-grid.vtk")).unwrap();
+    assert!(text.contains("-20.5 -18.5 -16.5 -12.5"));
+    let (even, warnings) = warned(|| folder.open("a.vtk", text.replace("-12.5", "-14.5").as_bytes()).unwrap());
+    assert_eq!((even.dims(), even.values(), warnings.len()), (DIMS, (&values()).into(), 0));
+    assert_near(even.spacing(), SPACING);
+}
+
+#[test]
+fn wrong_rectilinear_grids() {
+    let folder = Folder::new();
+    let refused = |name: &str, text: &str, instead: &str, field: &str, found: &str, allowed: &str| {
+        let all = fs::read_to_string(fixture(name)).unwrap();
+        assert!(all.contains(text), "{name}: {text}");
+        assert_refused(folder.open(name, all.replace(text, instead).as_bytes()), name, field, found, allowed);
+    };
+    let legacy = |text: &str, instead: &str, field: &str, found: &str, allowed: &str| {
+        refused("text-grid.vtk", text, instead, field, found, allowed);
+    };
+    let four = "4 times as many samples";
+    legacy("-12.5", "12.5", "Y_COORDINATES", "distances from 2.0000 to 29.0000, which need 18 samples", four);
+    legacy("-12.5", "-16.5", "Y_COORDINATES", "-16.5 before -16.5", "ascending finite numbers");
+    legacy("-12.5", "-20", "Y_COORDINATES", "-16.5 before -20", "ascending finite numbers");
+    legacy("-12.5", "nan", "Y_COORDINATES", "-16.5 before NaN", "ascending finite numbers");
+    legacy("-12.5", "1e308", "Y_COORDINATES", "distances from 2.0000", four);
+    legacy("-12.5", "x", "Y_COORDINATES", "\"x\"", "4 numbers of type float64");
+    legacy("Y_COORDINATES 4", "Y_COORDINATES 5", "Y_COORDINATES", "Z_COORDINATES", "5 numbers of type float64");
+    legacy("-16.5 -12.5", "-16.5", "Y_COORDINATES", "Z_COORDINATES", "4 numbers");
+    legacy(
+        "Y_COORDINATES 4 double\n-20.5 -18.5 -16.5 -12.5",
+        "",
+        "Y_COORDINATES",
+        "0 numbers",
+        "4, as DIMENSIONS says",
+    );
+    legacy("DIMENSIONS 5 4 3", "DIMENSIONS 4 5 3", "X_COORDINATES", "5 numbers", "4, as DIMENSIONS says");
+    legacy("double\n-20.5", "half\n-20.5", "type", "half", "char, signed_char");
+    legacy("RECTILINEAR_GRID", "STRUCTURED_GRID", "header", "DATASET STRUCTURED_GRID", "RECTILINEAR_GRID");
+    let xml = |text: &str, instead: &str, field: &str, found: &str, allowed: &str| {
+        refused("text.vtr", text, instead, field, found, allowed);
+    };
+    xml("Coordinates>", "Coordinate>", "Coordinates", "0 arrays", "three arrays, along x, y and z");
+    xml("-16.5 -12.5", "-16.5 -16.5", "Coordinates of y", "-16.5 before -16.5", "ascending finite numbers");
+    xml("-16.5 -12.5", "-16.5", "Coordinates of y", "24 bytes", "32 bytes (4 numbers of type float64)");
+    xml("type=\"RectilinearGrid\"", "type=\"Grid\"", "type", "Grid", "ImageData or RectilinearGrid");
+    // Binary coordinates, of which more are promised than there are.
+    let whole = fs::read(fixture("binary-grid.vtk")).unwrap();
+    let with = |count: &str| {
+        let at = whole.windows(15).position(|window| window == b"Z_COORDINATES 4").unwrap();
+        let count = format!("Z_COORDINATES {count}");
+        folder.open("a.vtk", &[&whole[..at], count.as_bytes(), &whole[at + 15..]].concat())
+    };
+    assert_refused(with("100000"), "a.vtk", "Z_COORDINATES", "the end of the file", "100000 numbers");
+    assert_refused(with("9999999999"), "a.vtk", "Z_COORDINATES", "9999999999", "less than 1048576 bytes");
 }
 
 #[test]

@@ -37,7 +37,7 @@ fn no_target_panics() {
             "npy" => &["npy"],
             "tiff" => &["tif"],
             "dicom" => &["dcm"],
-            "vti" => &["vti"],
+            "vti" => &["vti", "vtr"],
             "vtk" => &["vtk"],
             _ => &[],
         };

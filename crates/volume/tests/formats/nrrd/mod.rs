@@ -3,6 +3,7 @@
 mod damage;
 mod encodings;
 mod orientation;
+mod segments;
 
 use std::fs;
 use std::io::Write;
@@ -259,7 +260,7 @@ fn field_errors() {
     for wrong in ["zip", "base64", "zrl", "", "raw raw"] {
         assert_line_refused("encoding: raw", &format!("encoding: {wrong}\n"), "encoding", wrong, "raw, gzip or gz");
     }
-    for wrong in ["2", "5", "0", "-3", "3.0", "three", "99999999999"] {
+    for wrong in ["2", "6", "0", "-3", "3.0", "three", "99999999999"] {
         assert_line_refused("dimension: 3", &format!("dimension: {wrong}\n"), "dimension", wrong, "3 or 4");
     }
     for wrong in ["2 3", "2 3 4 1", "0 3 4", "2 -3 4", "2 3 4.0", "2,3,4", "", "65536 65536 1", "60000 60000 60000"] {

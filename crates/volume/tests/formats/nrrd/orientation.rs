@@ -4,6 +4,7 @@ use glam::{DMat3, DVec3};
 use sheetsplat_volume::{Orientation, PatientSide};
 
 use super::{Folder, PLAIN, assert_refused, bytes};
+use crate::{assert_near, assert_warned, warned};
 
 #[test]
 fn spacings() {
@@ -11,9 +12,7 @@ fn spacings() {
     let open = |line: &str| folder.attached(&format!("{PLAIN}{line}\n"), &bytes());
     assert_eq!(open("spacings: 1 0.5e-3\t+2.").unwrap().spacing(), DVec3::new(1.0, 0.5e-3, 2.0));
     let allowed = "three positive finite numbers";
-    for wrong in
-        ["1 1", "1 1 1 1", "nan 1 1", "1 NaN 1", "1 1 inf", "1 -1 1", "0 1 1", "1 1 x", "", "1,1,1", "1 1 1e400"]
-    {
+    for wrong in ["1 1", "1 1 1 1", "1 1 inf", "1 -1 1", "0 -1 1", "1 1 x", "", "1,1,1", "1 1 1e400"] {
         assert_refused(open(&format!("spacings: {wrong}")), "volume.nrrd", "spacings", wrong, allowed);
     }
 }
@@ -29,7 +28,29 @@ fn units() {
     assert_eq!(unit("units: \"um\" \"um\" \"micron\"").as_deref(), Some("µm"));
     assert_eq!(unit("space units: \"mm\" \"mm\" \"mm\"\nunits: \"m\" \"m\" \"m\"").as_deref(), Some("mm"));
     assert_eq!(unit("units: \"mm\" \"mm\" \"s\""), None);
+    assert_eq!(unit("units: \"mm\" \"mm\" \"\"").as_deref(), Some("mm"));
     assert_eq!(unit("units: mm"), None);
+}
+
+/// Lengths are converted to the unit of the finest axis, of the array for `units` and of the world for `space units`; 0 and NaN are no spacings.
+#[test]
+fn several_units_and_open_spacings() {
+    let folder = Folder::new();
+    let open = |fields: &str| warned(|| folder.attached(&format!("{PLAIN}{fields}\n"), &bytes()).unwrap());
+    let (volume, warnings) = open("spacings: 0.25 0.25 500\nunits: \"um\" \"um\" \"nm\"");
+    assert_near(volume.spacing(), DVec3::new(0.25, 0.25, 0.5));
+    assert_eq!(volume.unit(), Some("µm"));
+    assert_warned(&warnings, "units: \"um\", \"um\", \"nm\": lengths are converted to µm");
+    let directions = "space: RAS\nspace directions: (0,0.5,0) (250,0,0) (0,0,0.5)\nspace origin: (1000,2,3)";
+    let (volume, _) = open(&format!("{directions}\nspace units: \"nm\" \"um\" \"um\""));
+    assert_near(volume.spacing(), DVec3::new(500.0, 250.0, 500.0));
+    assert_near(volume.orientation().unwrap().origin, DVec3::new(1000.0, 2000.0, 3000.0));
+    assert_eq!(volume.unit(), Some("nm"));
+    for (spacings, expected) in [("0.5 2 0", [0.5, 2.0, 0.5]), ("nan 2 0", [2.0; 3]), ("0 0 0", [1.0; 3])] {
+        let (volume, warnings) = open(&format!("spacings: {spacings}"));
+        assert_eq!(volume.spacing(), DVec3::from_array(expected), "{spacings}");
+        assert_warned(&warnings, "an axis without a spacing is taken to have");
+    }
 }
 
 #[test]
