@@ -75,6 +75,7 @@ mod texel;
 mod text;
 #[cfg(feature = "tiff")]
 mod tiff;
+mod turned;
 #[cfg(feature = "dicom")]
 mod uneven;
 mod unit;

@@ -26,6 +26,8 @@ pub(super) struct Loaded<T: Voxel> {
     pub(super) value_unit: Option<String>,
     /// The orientation, if the file states it.
     pub(super) orientation: Option<Orientation>,
+    /// Whether the axes are left-handed in a space that is not a patient's.
+    pub(super) left_handed: bool,
     /// The colours that the file assigns to values, in ascending order of values.
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
     /// The values' names, if they are labels.
@@ -72,6 +74,7 @@ impl<T: Voxel> Loaded<T> {
             unit,
             value_unit,
             orientation,
+            left_handed: false,
             palette,
             label_names,
             series,
@@ -102,6 +105,11 @@ impl<T: Voxel> Loaded<T> {
             time_names: self.time_names.clone(),
             series_names: self.series_names.clone(),
         }
+    }
+
+    /// Whether the axes are left-handed, in whatever space.
+    pub(super) fn is_left_handed(&self) -> bool {
+        self.left_handed || self.orientation.is_some_and(|orientation| orientation.is_mirrored())
     }
 
     /// Checks that the values are those of one channel.

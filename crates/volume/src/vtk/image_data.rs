@@ -44,7 +44,7 @@ const TYPES: [(&str, SampleType); 10] = [
 pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let header = Header::read(path, access)?;
     let spacing = header.spacing()?;
-    header.check_direction()?;
+    let left_handed = header.is_left_handed()?;
     let array = header.choose()?;
     let dims = header.dims(array)?;
     let kind = array.fields.value("type", &TYPES.map(|(name, _)| name).join(", "), |text| {
@@ -66,7 +66,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
     };
     let stream = header.open(path, access, array, &Samples { dims: side, ..samples })?;
     let values = stream.series::<T>(&samples, &series, false)?;
-    Ok(Loaded { spacing: Some(spacing), series, ..Loaded::new(dims, kind, values) })
+    Ok(Loaded { spacing: Some(spacing), series, left_handed, ..Loaded::new(dims, kind, values) })
 }
 
 /// The elements that are needed, as their attributes.
@@ -161,8 +161,8 @@ impl Header {
         })
     }
 
-    /// Refuses a direction matrix whose axes are not orthogonal unit vectors.
-    fn check_direction(&self) -> Result<(), VolumeError> {
+    /// Whether the axes are left-handed. Refuses a direction matrix whose axes are not orthogonal unit vectors.
+    fn is_left_handed(&self) -> Result<bool, VolumeError> {
         let Some(matrix) = self.image.value("Direction", "nine finite numbers", |text| match text {
             None => Some(None),
             Some(text) => {
@@ -171,12 +171,13 @@ impl Header {
             }
         })?
         else {
-            return Ok(());
+            return Ok(false);
         };
         // The file stores the matrix row by row.
         let rows = matrix.transpose();
         let directions = unit_directions([rows.x_axis, rows.y_axis, rows.z_axis]);
-        directions.map(drop).map_err(|(found, allowed)| self.image.invalid("Direction", found, allowed))
+        let is_left_handed = directions.map(|axes| axes.determinant() < 0.0);
+        is_left_handed.map_err(|(found, allowed)| self.image.invalid("Direction", found, allowed))
     }
 
     /// The array to read: the active one, or else the first one with one component, or else the first one.
