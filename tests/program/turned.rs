@@ -18,7 +18,7 @@ fn pictures_of_one_head_are_the_same() {
     let folder = Folder::new();
     let picture = |name: &str, rest: &str| folder.pixels(&format!("{} {SIZE} {rest}", fixture(name)));
     for rest in [
-        "",
+        "--set splatting.slab_width=0.7",
         "--view front",
         "--preset mip",
         "--set splatting.classification=before --set transfer.opacity=[[20,0],[60,0.9]]",
@@ -45,7 +45,7 @@ fn pictures_of_one_head_are_the_same() {
 fn labels_and_channels_are_turned_too() {
     let folder = Folder::new();
     let labelled = |name: &str, labels: &str| {
-        let labels = format!("--set volume.labels={:?} --set transfer.label=[{{id=2,color=[1,0,0]}}]", fixture(labels));
+        let labels = format!("--set volume.labels={:?} --set transfer.label=[{{label=2,color=[1,0,0]}}]", fixture(labels));
         folder.pixels(&format!("{} {SIZE} {labels}", fixture(name)))
     };
     let expected = labelled("ras.nii", "labels-ras.nii");
