@@ -27,12 +27,14 @@ fn pictures_of_one_head_are_the_same() {
         assert_eq!(picture("ras.nii", rest), picture("las.nii", rest), "{rest}");
     }
     // The ball is on the patient's right, which is on the left from the front.
-    let (width, _, pixels) = picture("las.nii", "--view front --set transfer.opacity=[[150,0],[200,0.9]] --set camera.fit=volume");
+    let (width, _, pixels) =
+        picture("las.nii", "--view front --set transfer.opacity=[[150,0],[200,0.9]] --set camera.fit=volume");
     let shown: Vec<usize> = (0..pixels.len()).filter(|&at| pixels[at][3] > 0.5 && pixels[at][0] > 0.0).collect();
     assert!(!shown.is_empty() && shown.iter().all(|at| at % width < width / 2), "{shown:?}");
     // Words at the edges, and a saved scene.
     let annotated = |name: &str| {
-        let rest = "--view front --annotate sides --save-scene saved.toml -o out.png --set image={width=240,height=200}";
+        let rest =
+            "--view front --annotate sides --save-scene saved.toml -o out.png --set image={width=240,height=200}";
         folder.render(&format!("{} --backend cpu {rest}", fixture(name)));
         let saved = String::from_utf8(folder.read("saved.toml")).unwrap();
         folder.render("saved.toml --backend cpu -o again.png");
@@ -45,11 +47,13 @@ fn pictures_of_one_head_are_the_same() {
 fn labels_and_channels_are_turned_too() {
     let folder = Folder::new();
     let labelled = |name: &str, labels: &str| {
-        let labels = format!("--set volume.labels={:?} --set transfer.label=[{{label=2,color=[1,0,0]}}]", fixture(labels));
+        let labels =
+            format!("--set volume.labels={:?} --set transfer.label=[{{label=2,color=[1,0,0]}}]", fixture(labels));
         folder.pixels(&format!("{} {SIZE} {labels}", fixture(name)))
     };
     let expected = labelled("ras.nii", "labels-ras.nii");
-    for (name, labels) in [("las.nii", "labels-las.nii"), ("las.nii", "labels-ras.nii"), ("ras.nii", "labels-las.nii")] {
+    for (name, labels) in [("las.nii", "labels-las.nii"), ("las.nii", "labels-ras.nii"), ("ras.nii", "labels-las.nii")]
+    {
         assert!(labelled(name, labels) == expected, "{name} {labels}");
     }
     let channels = |names: [&str; 2]| {
@@ -70,8 +74,12 @@ fn info_says_that_x_is_turned() {
     let info = |name: &str| folder.run(&format!("info {}", fixture(name))).stdout;
     let [ras, las] = ["ras.nii", "las.nii"].map(info);
     assert!(ras.contains("x to the right, y to the front, z to the head\n"), "{ras}");
-    assert!(las.contains("x to the left, y to the front, z to the head; left-handed, so that pictures have x turned\n"), "{las}");
-    let other = |text: &str| text.lines().filter(|line| !line.starts_with("orientation")).collect::<Vec<_>>().join("\n");
+    assert!(
+        las.contains("x to the left, y to the front, z to the head; left-handed, so that pictures have x turned\n"),
+        "{las}"
+    );
+    let other =
+        |text: &str| text.lines().filter(|line| !line.starts_with("orientation")).collect::<Vec<_>>().join("\n");
     assert_eq!(other(&ras), other(&las));
 }
 
@@ -109,7 +117,9 @@ fn streamed_files_are_turned() {
     write("las.nrrd", "LAS", &turned);
     let two = [("RAYON_NUM_THREADS", "2")];
     let draw = |arguments: &str| {
-        folder.run_with(&two, "", &format!("render {arguments} {STREAMED} -o out.npy --stats stats.json")).assert_success();
+        folder
+            .run_with(&two, "", &format!("render {arguments} {STREAMED} -o out.npy --stats stats.json"))
+            .assert_success();
         let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
         (folder.read_npy("out.npy"), stats["chunks_read"].as_u64().unwrap_or(0))
     };
@@ -136,7 +146,9 @@ fn stores_are_turned() {
     let write = |name: &str, to: &str, turned: bool| {
         let store = folder.path(name);
         let axes = [("z", "inferior-to-superior"), ("y", "posterior-to-anterior"), ("x", to)];
-        let axes = axes.map(|(name, to)| json!({"name": name, "type": "space", "orientation": {"type": "anatomical", "value": to}}));
+        let axes = axes.map(
+            |(name, to)| json!({"name": name, "type": "space", "orientation": {"type": "anatomical", "value": to}}),
+        );
         let level = json!({"path": "0", "coordinateTransformations": [{"type": "scale", "scale": [1.0, 1.0, 1.0]}]});
         let group = json!({"zarr_format": 3, "node_type": "group", "attributes": {"ome": {
             "version": "0.6", "multiscales": [{"axes": axes, "datasets": [level]}],
@@ -174,7 +186,9 @@ fn stores_are_turned() {
     write("las.zarr", "right-to-left", true);
     let two = [("RAYON_NUM_THREADS", "2")];
     let draw = |arguments: &str| {
-        folder.run_with(&two, "", &format!("render {arguments} {STREAMED} -o out.npy --stats stats.json")).assert_success();
+        folder
+            .run_with(&two, "", &format!("render {arguments} {STREAMED} -o out.npy --stats stats.json"))
+            .assert_success();
         let stats: Value = serde_json::from_slice(&folder.read("stats.json")).unwrap();
         (folder.read_npy("out.npy"), stats["chunks_read"].as_u64().unwrap())
     };

@@ -53,8 +53,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let series = axes.series;
     let (label_names, palette) = (header.label_names(), header.palette());
     let value_unit = header.value_unit();
-    let loaded =
-        Loaded { spacing, unit, value_unit, orientation, left_handed, label_names, palette, series, ..loaded };
+    let loaded = Loaded { spacing, unit, value_unit, orientation, left_handed, label_names, palette, series, ..loaded };
     match lattice {
         Some(lattice) => lattice.straighten(path, DIRECTIONS, loaded, access),
         None => Ok(loaded),

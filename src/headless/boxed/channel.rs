@@ -146,7 +146,11 @@ impl<'a> ChannelChunks<'a> {
         let volume = if self.values.of.store.has_colors() { volume.with_texels(colors) } else { volume };
         let Some(labels) = &self.labels else { return Ok(volume) };
         let origin = labels.of.origin.clone();
-        let values = labels_of(&origin, (&labels.level.grid, within.low, grid.dims, 1), labels.read((within, parts), 0.0)?.values)?;
+        let values = labels_of(
+            &origin,
+            (&labels.level.grid, within.low, grid.dims, 1),
+            labels.read((within, parts), 0.0)?.values,
+        )?;
         let labels = Labels { origin, dims: grid.dims, spacing: None, values, names: BTreeMap::new() };
         Ok(volume.with_labels_in_order(labels)?)
     }

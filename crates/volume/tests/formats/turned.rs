@@ -100,9 +100,12 @@ fn boxes_of_left_handed_files() {
     assert!(store.contains(0, UVec3::ONE).is_err());
     // Colours of voxels, and channels after the first.
     let folder = Folder::new();
-    for (name, kinds, sizes) in [("rgb", "RGB-color domain domain domain", "3 5 4 3"), ("planes", "domain domain domain list", "5 4 3 3")] {
+    for (name, kinds, sizes) in
+        [("rgb", "RGB-color domain domain domain", "3 5 4 3"), ("planes", "domain domain domain list", "5 4 3 3")]
+    {
         let of = |space: &str| {
-            let directions = if name == "rgb" { "none (1,0,0) (0,1,0) (0,0,2)" } else { "(1,0,0) (0,1,0) (0,0,2) none" };
+            let directions =
+                if name == "rgb" { "none (1,0,0) (0,1,0) (0,0,2)" } else { "(1,0,0) (0,1,0) (0,0,2) none" };
             let header = format!(
                 "NRRD0004\ntype: uint8\ndimension: 4\nsizes: {sizes}\nkinds: {kinds}\nspace: {space}\n\
                  space directions: {directions}\nencoding: raw\n\n"
@@ -158,9 +161,8 @@ fn spaces_without_a_patient() {
     let text = fs::read_to_string(fixture("text.vti")).unwrap();
     let (before, rest) = text.split_once("Direction=\"").unwrap();
     let (_, after) = rest.split_once('"').unwrap();
-    let with = |direction: &str| {
-        folder.open("a.vti", format!("{before}Direction=\"{direction}\"{after}").as_bytes()).unwrap()
-    };
+    let with =
+        |direction: &str| folder.open("a.vti", format!("{before}Direction=\"{direction}\"{after}").as_bytes()).unwrap();
     assert!(!with("0 1 0 -1 0 0 0 0 1").grid().is_turned());
     let turned = with("-1 0 0 0 1 0 0 0 1");
     assert!(turned.grid().is_turned() && in_file_order(&turned) == values());
@@ -175,9 +177,7 @@ fn store(folder: &Folder, x: &Value, y: &Value, z: &Value) -> PathBuf {
         fs::write(path, bytes).unwrap();
     };
     let axis = |name: &str, to: &Value| json!({"name": name, "type": "space", "orientation": {"type": "anatomical", "value": to}});
-    let level = |path: &str, scale: [f64; 3], first: [f64; 3]| {
-        json!({"path": path, "coordinateTransformations": [{"type": "scale", "scale": scale}, {"type": "translation", "translation": first}]})
-    };
+    let level = |path: &str, scale: [f64; 3], first: [f64; 3]| json!({"path": path, "coordinateTransformations": [{"type": "scale", "scale": scale}, {"type": "translation", "translation": first}]});
     let group = json!({"zarr_format": 3, "node_type": "group", "attributes": {"ome": {"version": "0.6", "multiscales": [{
         "axes": [axis("z", z), axis("y", y), axis("x", x)],
         "datasets": [level("0", [2.0, 1.0, 1.0], [5.0, 0.0, 10.0]), level("1", [2.0, 1.0, 2.0], [5.0, 0.0, 10.5])],
@@ -246,5 +246,11 @@ fn strange_orientations_of_ome_zarr() {
         assert_eq!((volume.orientation(), volume.grid().is_turned()), (None, false), "{strange}");
     }
     let twice = Volume::open(&store(&folder, &json!("anterior-to-posterior"), &y, &z));
-    assert_refused(twice, "zarr.json", "attributes.ome.multiscales[0].axes", "", "orientations along three different lines");
+    assert_refused(
+        twice,
+        "zarr.json",
+        "attributes.ome.multiscales[0].axes",
+        "",
+        "orientations along three different lines",
+    );
 }
