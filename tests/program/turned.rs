@@ -22,7 +22,7 @@ fn pictures_of_one_head_are_the_same() {
         "--view front",
         "--preset mip",
         "--set splatting.classification=before --set transfer.opacity=[[20,0],[60,0.9]]",
-        "--set clip.crop=[[-20,-20,-20],[3,20,20]] --set clip.shade_faces=false",
+        "--set clip.crop=[[-20,-20,-20],[3,20,20]]",
     ] {
         assert_eq!(picture("ras.nii", rest), picture("las.nii", rest), "{rest}");
     }
@@ -48,7 +48,7 @@ fn labels_and_channels_are_turned_too() {
     let folder = Folder::new();
     let labelled = |name: &str, labels: &str| {
         let labels =
-            format!("--set volume.labels={:?} --set transfer.label=[{{label=2,color=[1,0,0]}}]", fixture(labels));
+            format!("--set volume.labels={:?} --set transfer.label=[{{label=2,color=[[0,[1,0,0]]]}}]", fixture(labels));
         folder.pixels(&format!("{} {SIZE} {labels}", fixture(name)))
     };
     let expected = labelled("ras.nii", "labels-ras.nii");
