@@ -17,7 +17,7 @@ pub struct Pick {
     pub position: DVec3,
     /// The depth along the camera's direction in world units, from the eye or, orthographic, from the camera's centre.
     pub depth: f64,
-    /// The nearest voxel.
+    /// The nearest voxel, in its file's own order ([`Grid::file_voxel`](crate::volume::Grid::file_voxel)).
     pub voxel: UVec3,
     /// The number of the channel (SPEC §10) with the greatest opacity in that voxel, the first of equal ones. The scene knows its name:
     /// [`Scene::channel_name`](crate::Scene::channel_name).
@@ -56,7 +56,7 @@ impl Pick {
         let (channel, _) = opacities.fold((0, 0.0), |best, of| if of.1 > best.1 { of } else { best });
         let of_channel = volume.channel(channel).unwrap_or(volume);
         let (value, label) = (of_channel.values().at(index as usize), of_channel.label(index));
-        Self { position, depth, voxel, channel, value, label }
+        Self { position, depth, voxel: grid.file_voxel(voxel), channel, value, label }
     }
 
     /// The error of a pick without a first hit: none were requested, or the pixel lies outside the image.

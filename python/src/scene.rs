@@ -13,7 +13,6 @@ use crate::error::{Raised, setting};
 use crate::process::detached;
 use crate::settings;
 use crate::volume::{BytesRead, Volume, reading, warn_of_holes};
-use crate::warnings;
 
 /// The sides of a patient.
 const SIDES: [(&str, PatientSide); 6] = [
@@ -117,7 +116,7 @@ impl Scene {
     }
 
     /// The scene with the camera on one side of the patient.
-    fn seen_from(&self, py: Python<'_>, volume: &Volume, side: &str) -> PyResult<Self> {
+    fn seen_from(&self, volume: &Volume, side: &str) -> PyResult<Self> {
         let Some(&(_, side)) = SIDES.iter().find(|(name, _)| *name == side) else {
             let allowed = SIDES.map(|(name, _)| format!("{name:?}")).join(", ");
             return Err(setting("side", &format!("{side:?}"), &allowed).into());
@@ -126,10 +125,6 @@ impl Scene {
             let allowed = "a volume that says how the patient lies, or camera.direction and camera.up";
             return Err(setting("side", "a volume without orientation", allowed).into());
         };
-        if orientation.is_mirrored() {
-            let message = "side: the volume's axes are left-handed, so the picture is a mirror image of the patient";
-            warnings::give(py, vec![(false, true, message.to_owned())])?;
-        }
         let mut scene = self.scene.clone();
         scene.camera = scene.camera.looking(orientation.direction_and_up(side));
         Ok(self.derived(scene)?)

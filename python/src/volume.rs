@@ -268,13 +268,15 @@ impl Volume {
         self.0.level()
     }
 
-    /// A copy of a channel's values, `[z, y, x]`.
+    /// A copy of a channel's values, `[z, y, x]`, in the order of the file or the array.
     fn values<'py>(&self, py: Python<'py>, channel: usize) -> PyResult<Bound<'py, PyArray3<f32>>> {
         let count = self.channels();
         let allowed = || error::volume("channel", &channel.to_string(), &format!("0 to {}", count - 1));
         let channel = self.whole("values")?.channels().nth(channel).ok_or_else(allowed)?;
         prepare_numpy(py)?;
-        PyArray1::from_vec(py, channel.values().to_vec()).reshape(self.shape().map(|size| size as usize))
+        let mut values = channel.values().to_vec();
+        channel.grid().reorder(&mut values);
+        PyArray1::from_vec(py, values).reshape(self.shape().map(|size| size as usize))
     }
 
     /// Facts about the volume, by the names of `sheetsplat info --json`; sizes and spacings are in the order z, y, x. Of one that is streamed, the values are those
@@ -305,7 +307,7 @@ impl Volume {
             named.set_item(name, value)?;
         }
         info.set_item("percentiles", named)?;
-        let axes = volume.orientation().map(|orientation| orientation.axes.to_cols_array_2d());
+        let axes = volume.file_orientation().map(|orientation| orientation.axes.to_cols_array_2d());
         info.set_item("axes", axes)?;
         info.set_item("labels", volume.labels().is_some())?;
         info.set_item(

@@ -53,12 +53,6 @@ def sheared(folder: pathlib.Path) -> Callable[[], Any]:
     return lambda: View(path, image=SMALL)
 
 
-def mirrored(folder: pathlib.Path) -> Callable[[], Any]:
-    fields = {"space": "RAS", "space directions": "(-1,0,0) (0,1,0) (0,0,1)", "space origin": "(0,0,0)"}
-    path = nrrd(folder, VALUES, **fields)
-    return lambda: sheetsplat.render(path, side="front", image=SMALL)
-
-
 def other_grid(folder: pathlib.Path) -> Callable[[], Any]:
     nrrd(folder, VALUES)
     nrrd(folder, VALUES[:, ::2], "b.nrrd", spacings="1 2 1")
@@ -72,7 +66,6 @@ CASES = [
     (holes_of_an_array, "1 of 60 samples are NaN or infinite"),
     (times, "2 times: the first is read"),
     (sheared, "sheared by 16.70°: resampled"),
-    (mirrored, "the picture is a mirror image of the patient"),
     (other_grid, "resampled from"),
 ]
 

@@ -30,6 +30,7 @@ mod statistics;
 mod stores;
 mod streaming;
 mod sweep;
+mod turned;
 
 use std::collections::BTreeSet;
 use std::fs;

@@ -13,7 +13,7 @@ use super::loaded::Loaded;
 use super::seek::FileStore;
 use super::store::Store;
 use super::voxel::Voxel;
-use super::{Grid, VolumeError, folder, nrrd};
+use super::{Grid, VolumeError, folder, nrrd, turned};
 
 type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
 
@@ -197,13 +197,18 @@ pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn St
     }
     let found = match format {
         #[cfg(feature = "zarr")]
-        Some(Format { name: ZARR, .. }) => return super::zarr::open(path, ZARR, access),
+        Some(Format { name: ZARR, .. }) => {
+            let stores = super::zarr::open(path, ZARR, access)?;
+            let is_left_handed = stores.iter().any(|store| turned::is_left_handed(&**store));
+            return Ok(turned::all(stores, is_left_handed));
+        }
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         Some(Format { name, read: Ok(read), .. }) if SEEKABLE.contains(name) => {
             let (noting, notes) = access.noting();
             let loaded = guarded(path, || read(path, &noting))?;
             let notes = notes.lock().unwrap_or_else(PoisonError::into_inner);
-            return FileStore::of_header(path, (name, &loaded), &notes, access);
+            let stores = FileStore::of_header(path, (name, &loaded), &notes, access)?;
+            return Ok(turned::all(stores, loaded.is_left_handed()));
         }
         Some(Format { name, .. }) => (*name).to_owned(),
         None => "another".to_owned(),

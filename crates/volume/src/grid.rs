@@ -48,6 +48,8 @@ pub struct Grid {
     pub(crate) place: DVec3,
     /// Of a box of a volume its first voxel there, and the volume's voxels along each axis; `None` if it is all of it.
     pub(crate) whole: Option<(UVec3, UVec3)>,
+    /// Whether the first axis runs against the file's, whose axes are left-handed.
+    pub(crate) turned: bool,
 }
 
 impl Grid {
@@ -59,7 +61,7 @@ impl Grid {
 
     /// A grid whose centre is the world's origin.
     pub const fn new(dims: UVec3, spacing: DVec3) -> Self {
-        Self { dims, spacing, finest: None, place: DVec3::ZERO, whole: None }
+        Self { dims, spacing, finest: None, place: DVec3::ZERO, whole: None, turned: false }
     }
 
     /// The grid of a coarser level of a volume (SPEC §13), whose centre lies at `place` from the centre of the finest level. Its unit of length is that of

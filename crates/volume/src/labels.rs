@@ -26,7 +26,7 @@ pub struct Labels {
     pub dims: UVec3,
     /// The distance between voxels in world units; `None` matches any volume's.
     pub spacing: Option<DVec3>,
-    /// The labels, x fastest.
+    /// The labels, x fastest, in the file's own order, also where its axes are left-handed.
     pub values: Arc<[u16]>,
     /// The labels' names, where known.
     pub names: BTreeMap<u16, String>,
@@ -66,22 +66,30 @@ impl Labels {
     }
 }
 
-/// The labels among values: of every `step`th voxel along each axis of a file, from voxel `from` on.
+/// The labels among values: of every `step`th voxel along each axis of a file's grid, from voxel `from` on.
 ///
 /// # Errors
 /// If a value is no label; the error names the file and the voxel.
 pub fn labels_of(
     origin: &str,
-    (from, dims, step): (UVec3, UVec3, u32),
+    (grid, from, dims, step): (&Grid, UVec3, UVec3, u32),
     values: impl IntoIterator<Item = f32>,
 ) -> Result<Arc<[u16]>, VolumeError> {
     let label = |(index, value): (u32, f32)| {
         u16::of(value).ok_or_else(|| {
-            let voxel = from + step * Grid::new(dims, DVec3::ONE).voxel_at(index);
+            let voxel = grid.file_voxel(from + step * Grid::new(dims, DVec3::ONE).voxel_at(index));
             VolumeError::invalid(origin, "data", format!("{value} at voxel {voxel}"), u16::ALLOWED.to_owned())
         })
     };
     (0..).zip(values).map(label).collect()
+}
+
+/// Labels in the order of a grid, from the file's own.
+fn turned(mut labels: Arc<[u16]>, grid: &Grid) -> Arc<[u16]> {
+    if grid.is_turned() {
+        grid.reorder(Arc::make_mut(&mut labels));
+    }
+    labels
 }
 
 impl Volume {
@@ -96,21 +104,40 @@ impl Volume {
         if let (Some(own), Some(of_volume)) = (&orientation, self.orientation()) {
             let grid = Grid::new(labels.dims, labels.spacing.unwrap_or(DVec3::ONE));
             grid.check().map_err(|error| refused(&labels.origin, error))?;
-            let places = ((&grid, Some(own)), (self.grid(), Some(of_volume)));
-            if let Some(values) = labels_onto(&labels.values, places, path, access)? {
-                let (dims, spacing) = (self.dims(), Some(self.spacing()));
-                return self.with_labels(Labels { dims, spacing, values, ..labels });
-            }
+            let (grid, own, values) = match own.is_mirrored() {
+                true => (grid.turned(), own.turned(&grid), turned(labels.values, &grid.turned())),
+                false => (grid, *own, labels.values),
+            };
+            let places = ((&grid, Some(&own)), (self.grid(), Some(of_volume)));
+            return match labels_onto(&values, places, path, access)? {
+                Some(values) => {
+                    let (dims, spacing) = (self.dims(), Some(self.spacing()));
+                    self.with_labels_in_order(Labels { dims, spacing, values, ..labels })
+                }
+                None => {
+                    let spacing = labels.spacing.filter(|_| !has_spacing);
+                    self.with_labels_in_order(Labels { spacing, values, ..labels })
+                }
+            };
         }
         let spacing = labels.spacing.filter(|_| !has_spacing);
         self.with_labels(Labels { spacing, ..labels })
     }
 
-    /// The same volume with other labels.
+    /// The same volume with other labels, in the order of its own file.
     ///
     /// # Errors
     /// If the labels' grid is another than the volume's.
-    pub fn with_labels(mut self, labels: Labels) -> Result<Self, VolumeError> {
+    pub fn with_labels(self, labels: Labels) -> Result<Self, VolumeError> {
+        let grid = self.grid;
+        let mut volume = self.with_labels_in_order(labels)?;
+        volume.labels = volume.labels.map(|labels| turned(labels, &grid));
+        Ok(volume)
+    }
+
+    /// As [`Self::with_labels`], in the order of the volume's values.
+    #[doc(hidden)]
+    pub fn with_labels_in_order(mut self, labels: Labels) -> Result<Self, VolumeError> {
         let Labels { origin, dims, spacing, values, names } = labels;
         let shown = |spacing: DVec3| format!("{:?}", spacing.to_array());
         if dims != self.dims() {

@@ -75,6 +75,7 @@ mod texel;
 mod text;
 #[cfg(feature = "tiff")]
 mod tiff;
+mod turned;
 #[cfg(any(feature = "dicom", feature = "vtk"))]
 mod uneven;
 mod unit;

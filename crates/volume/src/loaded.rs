@@ -26,6 +26,8 @@ pub(super) struct Loaded<T: Voxel> {
     pub(super) value_unit: Option<String>,
     /// The orientation, if the file states it.
     pub(super) orientation: Option<Orientation>,
+    /// Whether the axes are left-handed in a space that is not a patient's.
+    pub(super) left_handed: bool,
     /// The names and colours of values: one legend for the file, or one for each channel.
     pub(super) legends: Vec<Legend>,
     /// The volumes in the file.
@@ -87,6 +89,7 @@ impl<T: Voxel> Loaded<T> {
             unit,
             value_unit,
             orientation,
+            left_handed: false,
             legends,
             series,
             channel_names,
@@ -118,6 +121,11 @@ impl<T: Voxel> Loaded<T> {
             time_names: self.time_names.clone(),
             series_names: self.series_names.clone(),
         }
+    }
+
+    /// Whether the axes are left-handed, in whatever space.
+    pub(super) fn is_left_handed(&self) -> bool {
+        self.left_handed || self.orientation.is_some_and(|orientation| orientation.is_mirrored())
     }
 
     /// The legend of one of the file's channels, `number` among those that are read.

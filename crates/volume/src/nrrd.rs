@@ -37,6 +37,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let axes = header.axes()?;
     let dims = header.dims(&axes)?;
     let Place { lattice, orientation, unit } = header.place(&axes)?;
+    let left_handed = orientation.is_none() && lattice.is_some_and(|lattice| header.is_left_handed(lattice.axes));
     let layout = header.layout(dims, axes.series)?;
     let values = match header.data_files()? {
         Some(files) if axes.series.count() > 1 && files.count() > 1 => {
@@ -52,7 +53,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let legends = header.legends(series);
     warn_of_itk(path, header.1.get(NON_UNIFORM).map(String::as_str));
     let value_unit = header.value_unit();
-    let loaded = Loaded { spacing, unit, value_unit, orientation, legends, series, ..loaded };
+    let loaded = Loaded { spacing, unit, value_unit, orientation, left_handed, legends, series, ..loaded };
     match lattice {
         Some(lattice) => lattice.straighten(path, DIRECTIONS, loaded, access),
         None => Ok(loaded),
@@ -329,6 +330,13 @@ impl Header {
         let origin = self.0.value("space origin", "a vector (x,y,z)", |text| text.map_or(Some(DVec3::ZERO), vector))?;
         let axes = DMat3::from_diagonal(ras_from_space) * axes;
         Ok(Some(Orientation { axes, origin: ras_from_space * factors * origin }))
+    }
+
+    /// Whether axes with these directions are left-handed, in a space that is right-handed unless it says otherwise.
+    fn is_left_handed(&self, axes: DMat3) -> bool {
+        let space = self.0.get("space").map(lower).unwrap_or_default();
+        let is_left_handed = space.starts_with("3d-left-handed") || space.starts_with("3dlh");
+        (axes.determinant() < 0.0) != is_left_handed
     }
 
     /// The data files; `None` if the samples are in the header's own file.

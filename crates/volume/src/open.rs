@@ -44,6 +44,7 @@ impl Volume {
         let facts: Vec<StoreFacts> =
             channels.enumerate().map(|(at, channel)| loaded.facts(format, channel, at)).collect();
         let mut facts = facts.into_iter();
+        let is_left_handed = loaded.is_left_handed();
         let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();
         let spacing = access.spacing().or(spacing).unwrap_or(DVec3::ONE);
@@ -53,7 +54,8 @@ impl Volume {
             access.reserve(path, "data", format!("{dims} voxels with colours"), bytes)?;
             let volume = Self::from_components(&origin, dims, spacing, (values.as_slice(), sample_type))?;
             let facts = facts.next().unwrap_or_default();
-            return volume.stating(&origin, StoreFacts { palette: None, channel_name: None, display: None, ..facts });
+            let facts = StoreFacts { palette: None, channel_name: None, display: None, ..facts };
+            return Ok(volume.stating(&origin, facts)?.right_handed(is_left_handed));
         }
         // All channels' values, one after the other.
         let voxels = dims.element_product() as usize;
@@ -72,7 +74,7 @@ impl Volume {
             grid.check().map_err(|error| refused(&origin, error))?;
             (first.grid, first.levels, first.level, first.reads) = (grid, dims, level, Some(reads));
         }
-        first.with_channels(&origin, further)
+        Ok(first.with_channels(&origin, further)?.right_handed(is_left_handed))
     }
 }
 

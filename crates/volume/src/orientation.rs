@@ -15,7 +15,7 @@ pub(super) const RAS_FROM_LPS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
 /// Where a volume's axes point in a patient, in RAS: +x to the patient's right, +y to the front (anterior), +z to the head
 /// (superior).
 ///
-/// The orientation does not move the grid: world axes are the volume's own (SPEC §2).
+/// The orientation does not move the grid: world axes are the volume's own, the first of them turned where these are left-handed (SPEC §2).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Orientation {
     /// The unit vectors along the volume's x, y and z in RAS, one per column.
@@ -56,7 +56,8 @@ impl Orientation {
         ras.map(|vector| self.axes.transpose() * vector)
     }
 
-    /// Whether the volume's axes are left-handed in the patient, so that every image of the volume is mirrored.
+    /// Whether the axes are left-handed in the patient, as a file's own may be ([`Volume::file_orientation`](crate::Volume::file_orientation)); a volume's are
+    /// not.
     pub fn is_mirrored(&self) -> bool {
         self.axes.determinant() < 0.0
     }

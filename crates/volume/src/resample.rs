@@ -79,6 +79,20 @@ impl Volume {
         (key, origin): (&str, &Path),
         access: &Access,
     ) -> Result<Self, VolumeError> {
+        // Where one states no place, both count as in the order of their files.
+        let is_by_index = grid.orientation().is_none() || self.orientation().is_none();
+        let own = if is_by_index { self.with_turned(grid.grid().is_turned()) } else { self };
+        own.at_its_place_onto(grid, resampling, (key, origin), access)
+    }
+
+    /// As [`Self::onto`], from where the volume lies.
+    fn at_its_place_onto(
+        self,
+        grid: &Self,
+        resampling: Resampling,
+        (key, origin): (&str, &Path),
+        access: &Access,
+    ) -> Result<Self, VolumeError> {
         let places = [grid, &self].map(|volume| (volume.grid(), volume.orientation()));
         if is_same_grid(places[0], places[1]) {
             return Ok(self);

@@ -54,7 +54,7 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
     let spacing = level.grid.spacing * f64::from(step);
     // The first voxel of the sample is the level's first.
     let center = |grid: &Grid| grid.center() * grid.spacing;
-    let grid = Grid::new(dims, spacing);
+    let grid = Grid { turned: level.grid.turned, ..Grid::new(dims, spacing) };
     let place: DVec3 = level.grid.place() + center(&grid) - center(&level.grid);
     let grid = if number == 0 && step == 1 { level.grid } else { grid.coarser_than(&levels[0].grid, place) };
     let count = values.len() as u64;

@@ -8,6 +8,7 @@ use super::adapted::{AdaptedStore, Tally};
 use super::labels::labels_of;
 use super::resample::{Oriented, is_same_grid};
 use super::sample::{parts_of, sample_at, spread};
+use super::turned::with_turned;
 use super::{ChunkProgress, Grid, IndexedStore, Labels, Store, StoreIndex, Volume, VolumeError};
 use crate::StoreCounts;
 
@@ -71,6 +72,14 @@ impl StreamedLevel {
         Err(VolumeError::invalid(&self.origin, "level", self.level.to_string(), format!("0 to {}", levels - 1)))
     }
 
+    /// The level with its first axis turned as another one's, unless both state how they lie in the patient.
+    fn in_order_of(self, other: &Self) -> Self {
+        if self.store.facts().orientation.is_some() && other.store.facts().orientation.is_some() {
+            return self;
+        }
+        Self { store: with_turned(self.store, other.grid().is_turned()), ..self }
+    }
+
     /// The number of the level whose voxels lie on those of a grid, which counts as lying where the finest level does.
     fn level_on(&self, grid: &Grid) -> Option<usize> {
         self.store.levels().iter().position(|level| is_same_grid((&level.grid, None), (grid, None)))
@@ -85,11 +94,13 @@ impl From<StreamedLevel> for StreamedChannel {
 }
 
 impl StreamedChannel {
-    /// The channel with labels in place of any others. Labels of a store that states no spacing have that of the values.
+    /// The channel with labels in place of any others. Labels of a store that states no spacing have that of the values. If one of the two does not state how it
+    /// lies in the patient, the labels count as in the order of the values' file.
     ///
     /// # Errors
     /// If the values' spacing is not one that a store can have.
     pub fn with_labels(self, labels: StreamedLevel) -> Result<Self, VolumeError> {
+        let labels = labels.in_order_of(&self.values);
         let finest = |of: &StreamedLevel| of.store.levels()[0].grid.spacing;
         let (spacing, is_stated) = (finest(&self.values), labels.store.facts().spacing.is_some());
         let labels = match is_stated || finest(&labels) == spacing {
@@ -290,11 +301,11 @@ pub fn sample_of_channels(
         let values = read(&channel.values)?;
         let Some(labels) = &channel.labels else { return Ok(values) };
         let own = read(labels)?;
-        values.with_labels(Labels {
+        values.with_labels_in_order(Labels {
             origin: labels.origin.clone(),
             dims: own.dims(),
             spacing: None,
-            values: labels_of(&labels.origin, (UVec3::ZERO, own.dims(), step), own.values().iter())?,
+            values: labels_of(&labels.origin, (&common[number], UVec3::ZERO, own.dims(), step), own.values().iter())?,
             names: labels.store.facts().label_names,
         })
     };

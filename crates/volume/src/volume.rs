@@ -22,7 +22,8 @@ use crate::for_type;
 
 /// A scalar volume on a rectilinear grid (SPEC §2): `dims` voxels, x fastest in memory, `spacing` world units apart.
 ///
-/// World axes are the volume's axes and the origin is the volume's centre. Values are finite `f32`, except in holes (SPEC §3), where
+/// World axes are the volume's axes and the origin is the volume's centre. World axes are right-handed: the first axis of a file whose axes are left-handed is
+/// turned ([`Grid::is_turned`]). Values are finite `f32`, except in holes (SPEC §3), where
 /// they are NaN. They are kept in the fewest bits that hold every one of them ([`Values`]). A segmented volume also has a label per voxel, and a volume of colours a colour ([`Self::from_colors`]). A volume may have further
 /// channels on the same grid ([`Self::further`]).
 #[derive(Clone, Debug)]
@@ -209,7 +210,7 @@ impl Volume {
         let StoreFacts { encoding, spacing: _, unit, value_unit, orientation, palette, .. } = facts;
         let StoreFacts { label_names, channel_name, display, time_names, series_names, .. } = facts;
         let volume = Self { encoding, unit, value_unit, palette, label_names, channel_name, display, ..self };
-        Self { time_names, series_names, ..volume }.with_orientation(origin, orientation)
+        Self { time_names, series_names, ..volume }.oriented(origin, orientation)
     }
 
     /// The marks that tell the times of the volume's file apart, from the first on, where they are more than their numbers.
@@ -278,16 +279,23 @@ impl Volume {
         Self { value_unit: unit, ..self }
     }
 
-    /// How the volume lies in a patient, if known.
+    /// How the volume lies in a patient, if known. The axes are right-handed: those of a file whose axes are not ([`Self::file_orientation`]) with the first
+    /// one turned.
     pub fn orientation(&self) -> Option<&Orientation> {
         self.orientation.as_ref()
     }
 
-    /// The same volume with another orientation, or with an unknown one. `origin` names the volume in errors.
+    /// The same volume with another orientation of its file's or array's own axes, or with an unknown one. If they are left-handed, the first axis is turned.
+    /// `origin` names the volume in errors.
     ///
     /// # Errors
     /// If the axes are not orthogonal unit vectors (to 1 in 10⁴), or a number is not finite.
-    pub fn with_orientation(mut self, origin: &str, orientation: Option<Orientation>) -> Result<Self, VolumeError> {
+    pub fn with_orientation(self, origin: &str, orientation: Option<Orientation>) -> Result<Self, VolumeError> {
+        Ok(self.with_turned(false).oriented(origin, orientation)?.right_handed(false))
+    }
+
+    /// The same volume with another orientation of its axes.
+    fn oriented(mut self, origin: &str, orientation: Option<Orientation>) -> Result<Self, VolumeError> {
         if let Some(Orientation { axes, origin: first }) = orientation {
             let excess = (axes.transpose() * axes - DMat3::IDENTITY).to_cols_array();
             if !(first.is_finite() && excess.iter().all(|excess| excess.abs() <= 2.0 * MAX_COSINE)) {
@@ -336,7 +344,7 @@ impl Volume {
         self.palette.as_deref()
     }
 
-    /// All values, x fastest, then y, then z. Holes are NaN.
+    /// All values, x fastest, then y, then z; where the file's axes are left-handed, x is turned ([`Grid::file_voxel`]). Holes are NaN.
     pub fn values(&self) -> ValueSlice<'_> {
         self.values.as_slice()
     }

@@ -14,7 +14,7 @@ use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{OpenVolume, Scene, SceneError, VolumeSource};
 use sheetsplat::settings::navigation;
 use sheetsplat::stats::Stats;
-use sheetsplat::volume::{self, Orientation, ReadOptions, StreamedVolume, Volume};
+use sheetsplat::volume::{self, ReadOptions, StreamedVolume, Volume};
 
 use crate::failure::Failure;
 use crate::outputs::Outputs;
@@ -343,10 +343,6 @@ impl Input {
         let (holes, samples) = (volume.holes(), volume.values().len());
         if holes > 0 {
             log::warn!("{}: {holes} of {samples} samples are NaN or infinite: these holes are not drawn", self.name);
-        }
-        if self.view.is_some() && volume.orientation().is_some_and(Orientation::is_mirrored) {
-            let name = &self.name;
-            log::warn!("{name}: --view: the axes are left-handed, so the image is a mirror image of the patient");
         }
     }
 

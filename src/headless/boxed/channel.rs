@@ -146,9 +146,13 @@ impl<'a> ChannelChunks<'a> {
         let volume = if self.values.of.store.has_colors() { volume.with_texels(colors) } else { volume };
         let Some(labels) = &self.labels else { return Ok(volume) };
         let origin = labels.of.origin.clone();
-        let values = labels_of(&origin, (within.low, grid.dims, 1), labels.read((within, parts), 0.0)?.values)?;
+        let values = labels_of(
+            &origin,
+            (&labels.level.grid, within.low, grid.dims, 1),
+            labels.read((within, parts), 0.0)?.values,
+        )?;
         let labels = Labels { origin, dims: grid.dims, spacing: None, values, names: BTreeMap::new() };
-        Ok(volume.with_labels(labels)?)
+        Ok(volume.with_labels_in_order(labels)?)
     }
 
     /// The labels of some voxels, 0 without any, which are read in blocks.
@@ -167,7 +171,8 @@ impl<'a> ChannelChunks<'a> {
             let ends = (UVec3::MAX, UVec3::ZERO);
             let (low, last) = block.iter().fold(ends, |(low, last), &at| (low.min(voxels[at]), last.max(voxels[at])));
             let (within, grid) = (VoxelBox { low, end: last + 1 }, Grid::new(last + 1 - low, DVec3::ONE));
-            let own = labels_of(&labels.of.origin, (low, grid.dims, 1), labels.read((within, &[within]), 0.0)?.values)?;
+            let own = labels.read((within, &[within]), 0.0)?.values;
+            let own = labels_of(&labels.of.origin, (&labels.level.grid, low, grid.dims, 1), own)?;
             block.into_iter().for_each(|at| found[at] = own[grid.index_of(voxels[at] - low) as usize]);
         }
         Ok(found)

@@ -48,9 +48,7 @@ const TYPES: [(&str, SampleType); 10] = [
 /// Reads the array of one file.
 pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
     let header = Header::read(path, access)?;
-    if !header.is_rectilinear {
-        header.check_direction()?;
-    }
+    let left_handed = !header.is_rectilinear && header.is_left_handed()?;
     let array = header.choose()?;
     let dims = header.dims(array)?;
     let samples = header.samples(array, dims)?;
@@ -67,7 +65,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         let coordinates = header.coordinates(path, access, array.of_cells)?;
         return resampled(path, coordinates, loaded, access);
     }
-    Ok(Loaded { spacing: Some(header.spacing()?), ..loaded })
+    Ok(Loaded { spacing: Some(header.spacing()?), left_handed, ..loaded })
 }
 
 /// The elements that are needed, as their attributes.
@@ -221,8 +219,8 @@ impl Header {
         })
     }
 
-    /// Refuses a direction matrix whose axes are not orthogonal unit vectors.
-    fn check_direction(&self) -> Result<(), VolumeError> {
+    /// Whether the axes are left-handed. Refuses a direction matrix whose axes are not orthogonal unit vectors.
+    fn is_left_handed(&self) -> Result<bool, VolumeError> {
         let Some(matrix) = self.image.value("Direction", "nine finite numbers", |text| match text {
             None => Some(None),
             Some(text) => {
@@ -231,12 +229,13 @@ impl Header {
             }
         })?
         else {
-            return Ok(());
+            return Ok(false);
         };
         // The file stores the matrix row by row.
         let rows = matrix.transpose();
         let directions = unit_directions([rows.x_axis, rows.y_axis, rows.z_axis]);
-        directions.map(drop).map_err(|(found, allowed)| self.image.invalid("Direction", found, allowed))
+        let is_left_handed = directions.map(|axes| axes.determinant() < 0.0);
+        is_left_handed.map_err(|(found, allowed)| self.image.invalid("Direction", found, allowed))
     }
 
     /// The array to read: the active one, or else the first one with one component, or else the first one.

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use serde_json::Value;
 
 use super::super::VolumeError;
@@ -13,6 +13,7 @@ use super::super::display::ChannelDisplay;
 use super::super::error::volume::{invalid, refused};
 use super::super::grid::{Grid, check_spacing};
 use super::super::loaded::{Legend, Loaded};
+use super::super::orientation::Orientation;
 use super::super::series::{MAX_CHANNELS, Series};
 use super::super::voxel::Voxel;
 use super::array::ZarrArray;
@@ -35,6 +36,8 @@ pub(super) struct Image {
     /// From the finest, at least one.
     pub(super) levels: Vec<Level>,
     pub(super) unit: Option<String>,
+    /// The directions of x, y and z in the patient (RAS).
+    orientation: Option<DMat3>,
     pub(super) series: Series,
     pub(super) channel_names: Vec<String>,
     pub(super) displays: Vec<ChannelDisplay>,
@@ -48,6 +51,8 @@ pub(super) struct Image {
 pub(super) struct Level {
     pub(super) array: ZarrArray,
     pub(super) grid: Grid,
+    /// The place of the first voxel's centre.
+    first: DVec3,
 }
 
 /// A group or an array: the file with its attributes, and what that holds.
@@ -115,8 +120,10 @@ impl Image {
 
     /// Values of a level with what the metadata state about all of them.
     pub(super) fn stated<T: Voxel>(&self, level: usize, values: T::Many) -> Loaded<T> {
-        let Level { array, grid } = &self.levels[level];
+        let Level { array, grid, first } = &self.levels[level];
+        let orientation = self.orientation.map(|axes| Orientation { axes, origin: axes * *first });
         Loaded {
+            orientation,
             unit: self.unit.clone(),
             series: self.series,
             channel_names: self.channel_names.clone(),
@@ -130,11 +137,11 @@ impl Image {
     fn plain(keys: Arc<Keys>) -> Result<Self, VolumeError> {
         let array = ZarrArray::open(&keys, "", None)?;
         let grid = Grid::new(array.dims(), DVec3::ONE);
-        let levels = vec![Level { array, grid }];
+        let levels = vec![Level { array, grid, first: DVec3::ZERO }];
         let metadata = vec![levels[0].array.metadata()];
         let (channel_names, displays, legend) = (Vec::new(), Vec::new(), Legend::default());
-        let (unit, series) = (None, series_of(&keys, &levels)?);
-        Ok(Self { keys, levels, unit, series, channel_names, displays, legend, metadata })
+        let (unit, orientation, series) = (None, None, series_of(&keys, &levels)?);
+        Ok(Self { keys, levels, unit, orientation, series, channel_names, displays, legend, metadata })
     }
 
     /// The image whose levels lie below a group of a store.
@@ -184,12 +191,12 @@ impl Image {
                     grid
                 }
             };
-            levels.push(Level { array, grid });
+            levels.push(Level { array, grid, first: dataset.first });
         }
         let (channel_names, displays) = display::channels(&ome.get("omero"));
         let legend = display::labels(&ome.get("image-label"));
-        let (unit, series) = (multiscale.unit, series_of(&keys, &levels)?);
-        Ok(Self { keys, levels, unit, series, channel_names, displays, legend, metadata })
+        let (unit, orientation, series) = (multiscale.unit, multiscale.orientation, series_of(&keys, &levels)?);
+        Ok(Self { keys, levels, unit, orientation, series, channel_names, displays, legend, metadata })
     }
 }
 

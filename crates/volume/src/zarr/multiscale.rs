@@ -4,7 +4,7 @@
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::super::VolumeError;
 use super::super::unit;
@@ -15,6 +15,8 @@ use super::json::Json;
 pub(super) struct Multiscale {
     pub(super) axes: Axes,
     pub(super) unit: Option<String>,
+    /// The directions of x, y and z in the patient (RAS), if all of them are stated.
+    pub(super) orientation: Option<DMat3>,
     pub(super) datasets: Vec<Dataset>,
 }
 
@@ -57,7 +59,8 @@ impl Multiscale {
         if datasets.is_empty() {
             return Err(multiscale.get("datasets").invalid("a list of at least one dataset"));
         }
-        Ok(Self { axes, unit, datasets })
+        let orientation = orientation(&axes_json, &axes)?;
+        Ok(Self { axes, unit, orientation, datasets })
     }
 }
 
@@ -88,6 +91,32 @@ impl Placement {
         }
         Ok(())
     }
+}
+
+/// The directions of x, y and z in a patient, by the axes' `orientation` (RFC 4 of NGFF); `None` unless each has one of the six.
+///
+/// # Errors
+/// If two of them lie along the same line.
+fn orientation(all: &Json, axes: &Axes) -> Result<Option<DMat3>, VolumeError> {
+    const DIRECTIONS: [(&str, DVec3); 6] = [
+        ("left-to-right", DVec3::X),
+        ("right-to-left", DVec3::NEG_X),
+        ("posterior-to-anterior", DVec3::Y),
+        ("anterior-to-posterior", DVec3::NEG_Y),
+        ("inferior-to-superior", DVec3::Z),
+        ("superior-to-inferior", DVec3::NEG_Z),
+    ];
+    let members = all.members();
+    let direction = |axis: Axis| {
+        let value = members[axes.of(axis)?].get("orientation").get("value");
+        DIRECTIONS.iter().find(|(name, _)| Some(*name) == value.text()).map(|&(_, direction)| direction)
+    };
+    let [Some(x), Some(y), Some(z)] = SPACE.map(direction) else { return Ok(None) };
+    let directions = DMat3::from_cols(x, y, z);
+    if directions.determinant() == 0.0 {
+        return Err(all.invalid("orientations along three different lines"));
+    }
+    Ok(Some(directions))
 }
 
 /// A finite number for each axis.

@@ -8,7 +8,7 @@ use crate::*;
 
 /// Reads every box of a store, each of which must hold the volume's values.
 #[track_caller]
-fn assert_holds(store: &Arc<dyn Store>, volume: &Volume, name: &str) {
+pub(crate) fn assert_holds(store: &Arc<dyn Store>, volume: &Volume, name: &str) {
     let [level] = store.levels() else { panic!("{name}: {store:?}") };
     assert_eq!((level.grid.dims, level.grid.spacing), (volume.dims(), volume.spacing()), "{name}");
     assert!(store.contains(0, UVec3::ZERO).unwrap(), "{name}");
@@ -37,7 +37,7 @@ fn assert_holds(store: &Arc<dyn Store>, volume: &Volume, name: &str) {
 
 #[test]
 fn boxes_of_uncompressed_files() {
-    for name in ["sform.nii", "nifti2-big.nii", "pair.hdr", "local.mha", "flipped.mhd", "c.npy"] {
+    for name in ["sform.nii", "nifti2-big.nii", "pair.hdr", "local.mha", "flipped.mhd", "turned/las.nii", "c.npy"] {
         let store = open_store(&fixture(name), &ReadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
         assert_holds(&store, &Volume::open(&fixture(name)).unwrap(), name);
     }

@@ -76,6 +76,11 @@ fn labels_in_other_orientations() {
     ] {
         let (volume, warnings) = labelled(name, &nifti(dims, affine, &filled(dims, |voxel| label(at(voxel)))));
         assert_labels(&volume.unwrap(), label);
+        // Turned, a left-handed file lies where the volume does.
+        if name == "las.nii" {
+            assert!(warnings.is_empty(), "{warnings:?}");
+            continue;
+        }
         assert_warned(&warnings, "labels: resampled from ");
         assert_warned(&warnings, "the volume's, each label the nearest one");
     }

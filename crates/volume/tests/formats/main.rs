@@ -36,6 +36,7 @@ mod shared;
 mod shear;
 mod tiff;
 mod tiff_planes;
+mod turned;
 mod units;
 mod values;
 mod vtk;
@@ -79,8 +80,14 @@ fn fixture(name: &str) -> PathBuf {
 #[track_caller]
 fn open(name: &str) -> Volume {
     let volume = Volume::open(&fixture(name)).unwrap_or_else(|error| panic!("{error}"));
-    assert_eq!((volume.dims(), volume.values()), (DIMS, (&values()).into()), "{name}");
+    assert_eq!((volume.dims(), in_file_order(&volume)), (DIMS, values()), "{name}");
     volume
+}
+
+/// The values of a volume in its file's own order.
+fn in_file_order(volume: &Volume) -> Vec<f32> {
+    let at = |index: u32| volume.value(volume.grid().file_voxel(volume.grid().voxel_at(index)));
+    (0..volume.dims().element_product()).map(at).collect()
 }
 
 #[track_caller]
@@ -88,10 +95,12 @@ fn assert_near(found: DVec3, expected: DVec3) {
     assert!((found - expected).abs().max_element() < 1e-5, "{found}, not {expected}");
 }
 
-/// Asserts spacing, axes and origin, these in RAS.
+/// Asserts spacing, and the file's axes and origin, these in RAS; the volume's own axes are right-handed.
 #[track_caller]
 fn assert_lies(volume: &Volume, axes: DMat3, origin: DVec3) {
-    let &Orientation { axes: found, origin: first } = volume.orientation().unwrap();
+    let Orientation { axes: found, origin: first } = volume.file_orientation().unwrap();
+    assert_eq!(volume.grid().is_turned(), axes.determinant() < 0.0);
+    assert!(!volume.orientation().unwrap().is_mirrored());
     for i in 0..3 {
         assert_near(found.col(i), axes.col(i));
     }

@@ -30,11 +30,12 @@ fn of_itk() {
 fn flipped_by_itk() {
     let volume = Volume::open(&fixture("flipped.mhd")).unwrap();
     let rows: Vec<f32> = values().chunks(5).flat_map(|row| row.iter().rev().copied()).collect();
-    assert_eq!((volume.dims(), volume.values()), (DIMS, (&rows).into()));
+    assert_eq!((volume.dims(), in_file_order(&volume)), (DIMS, rows));
+    // Turned, it is the array again.
+    assert_eq!(volume.values(), values());
     let axes = DMat3::from_diagonal(RAS_FROM_LPS) * rotation();
     let flipped = axes * DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
     assert_lies(&volume, flipped, RAS_FROM_LPS * ORIGIN + axes.x_axis * 4.0 * SPACING.x);
-    assert!(volume.orientation().unwrap().is_mirrored());
 }
 
 #[test]

@@ -22,14 +22,12 @@ fn sform_slope_and_intercept() {
     let expected: Vec<f32> = values().iter().map(|value| 0.5 * value - 3.0).collect();
     assert_eq!((volume.dims(), volume.values()), (DIMS, (&expected).into()));
     assert_lies(&volume, rotation(), ORIGIN);
-    assert!(!volume.orientation().unwrap().is_mirrored());
 }
 
 #[test]
 fn qform_mirrored_big_endian_and_gzipped() {
     let volume = open("qform-big.nii.gz");
     assert_lies(&volume, rotation() * DMat3::from_diagonal(DVec3::new(1.0, 1.0, -1.0)), ORIGIN);
-    assert!(volume.orientation().unwrap().is_mirrored());
 }
 
 #[test]

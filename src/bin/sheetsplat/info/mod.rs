@@ -220,7 +220,9 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
             format!("{x} × {y} × {z}, as the volume does not fit into memory; values below are the sample's"),
         );
     }
-    line("orientation", volume.orientation().map_or("not given".to_owned(), orientation));
+    let turned = if volume.grid().is_turned() { "; left-handed, so that pictures have x turned" } else { "" };
+    let stated = volume.file_orientation().map_or("not given".to_owned(), |stated| orientation(&stated));
+    line("orientation", stated + turned);
     if info.holes > 0 {
         line("holes", format!("{} samples are NaN or infinite", info.holes));
     }
@@ -249,7 +251,7 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
     text + &chart(&histogram)
 }
 
-/// The anatomical directions of the axes.
+/// The anatomical directions of the file's own axes.
 fn orientation(orientation: &Orientation) -> String {
     let sides = [["right", "left"], ["front", "back"], ["head", "feet"]];
     let axis = |axis: DVec3| {
@@ -259,8 +261,7 @@ fn orientation(orientation: &Orientation) -> String {
         if degrees < 0.5 { side.to_owned() } else { format!("{side} (within {degrees:.0}°)") }
     };
     let [x, y, z] = [0, 1, 2].map(|i| axis(orientation.axes.col(i)));
-    let handedness = if orientation.is_mirrored() { ", left-handed" } else { "" };
-    format!("x to the {x}, y to the {y}, z to the {z}{handedness}")
+    format!("x to the {x}, y to the {y}, z to the {z}")
 }
 
 /// A bar chart over values, with logarithmic counts.

@@ -111,11 +111,12 @@ fn orientation() {
         let axes = [DVec3::NEG_Y, DVec3::X, DVec3::Z].map(|axis| axis * signs);
         for name in names {
             let volume = open(name, "space origin: (1, 2.5, -3)\n").unwrap();
-            let orientation = volume.orientation().unwrap();
+            let orientation = volume.file_orientation().unwrap();
             assert_eq!(orientation.axes, DMat3::from_cols_array_2d(&axes.map(|axis| axis.to_array())), "{name}");
             assert_eq!(orientation.origin, DVec3::new(1.0, 2.5, -3.0) * signs, "{name}");
             assert_eq!(orientation.is_mirrored(), signs.element_product() < 0.0, "{name}");
-            assert_eq!(open(name, "").unwrap().orientation().unwrap().origin, DVec3::ZERO);
+            assert_eq!(volume.grid().is_turned(), orientation.is_mirrored(), "{name}");
+            assert_eq!(open(name, "").unwrap().file_orientation().unwrap().origin, DVec3::ZERO);
         }
     }
     // Spaces other than a patient's have no orientation.
@@ -159,7 +160,9 @@ fn orientations_are_orthonormal() {
     let volume = Folder::new().attached(PLAIN, &bytes()).unwrap();
     let set = |axes: DMat3, origin: DVec3| volume.clone().with_orientation("here", Some(Orientation { axes, origin }));
     let mirrored = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
-    assert!(set(mirrored, DVec3::ONE).unwrap().orientation().unwrap().is_mirrored());
+    let turned = set(mirrored, DVec3::ONE).unwrap();
+    assert!(turned.file_orientation().unwrap().is_mirrored() && !turned.orientation().unwrap().is_mirrored());
+    assert!(turned.clone().with_orientation("here", None).unwrap() == volume, "as the array was");
     let skewed = DMat3::from_cols(DVec3::X, DVec3::new(1e-3, 1.0, 0.0), DVec3::Z);
     let wrong = [(skewed, DVec3::ZERO), (DMat3::IDENTITY * 1.001, DVec3::ZERO), (DMat3::IDENTITY, DVec3::NAN)];
     for (axes, origin) in wrong.into_iter().chain([(DMat3::NAN, DVec3::ZERO)]) {
