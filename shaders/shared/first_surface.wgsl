@@ -36,7 +36,7 @@ fn surface_between(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, ta
     let domain = table.domain;
     let first = clamp(mix(near.x, far.x, start), domain.x, domain.z);
     let last = clamp(mix(near.x, far.x, end), domain.x, domain.z);
-    // For `surface` the table's head holds the range of numbers that are at least half opaque.
+    // The table's head holds the range of numbers with an opacity, of linear slabs those that are at least half opaque.
     if max(first, last) < head.z || min(first, last) > head.w {
         return NO_SURFACE;
     }

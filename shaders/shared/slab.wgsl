@@ -162,12 +162,27 @@ struct Segment {
     last: vec4f,
 }
 
-// The `i`-th of as many segments of a slab: all of it, or the halves of its cubic profile.
-fn segment_of(slab: Slab, i: u32, segments: u32) -> Segment {
-    let width = frame.slab_width / f32(segments);
+// The `i`-th of a slab's segments: all of it, or the halves of its cubic profile.
+fn segment_of(slab: Slab, i: u32) -> Segment {
+    let width = frame.slab_width / f32(SEGMENTS);
     let first = select(slab.first, slab.middle, i == 1u);
-    let last = select(slab.last, slab.middle, i == 0u && segments == 2u);
+    let last = select(slab.last, slab.middle, i + 1u < SEGMENTS);
     return Segment(slab.near + f32(i) * width, width, first, last);
+}
+
+// `after::slab_integral` explains these.
+const MIN_BENT = 1e-3;
+const SINGLE = 5e-7;
+
+// The sample in the middle, given the slab's mean amount: on the line between the planes where only rounding tells the slab from one that shows nothing.
+fn middle_of(slab: Slab, amount: f32, table: Table) -> vec4f {
+    let low = min(slab.first.x, slab.last.x);
+    let high = max(slab.first.x, slab.last.x);
+    // Bins divide the range of all numbers.
+    let hair = HAIR_OF_RANGE * table.head.y / table.domain.y;
+    let is_faint = amount < MIN_BENT && (high < table.head.z + hair || low > table.head.w - hair);
+    let is_single = COMPOSITING == SURFACE && amount * (high - low) < SINGLE;
+    return select(slab.middle, 0.5 * (slab.first + slab.last), is_faint || is_single);
 }
 
 // The sheets of a slab's segments.
@@ -181,14 +196,21 @@ fn sheets_of(slab: Slab, light: Lighting) -> SlabSheets {
     let part = part_of(slab.ray, slab.near, slab.far);
     let table = table_at(slab.at, 0.5 * (part.x + part.y), 0.0);
     var sheets = SlabSheets();
+    var seen_slab = slab;
     // First the whole slab, whose halves count only if it shows anything: one place for all, because much is compiled into it.
     let is_seen = is_drawn(0.5 * (slab.near + slab.far));
     for (var step = select(SEGMENTS + 1u, 2u - SEGMENTS, is_seen); step <= SEGMENTS; step += 1u) {
         let is_whole = step == 0u;
-        let segment = segment_of(slab, max(step, 1u) - 1u, select(SEGMENTS, 1u, is_whole));
+        var segment = segment_of(seen_slab, max(step, 1u) - 1u);
+        if is_whole {
+            segment.last = slab.last;
+        }
         let means = slab_integral(table, segment.first.x, segment.last.x);
         if means.amount <= 0.0 && is_whole {
             break;
+        }
+        if is_whole {
+            seen_slab.middle = middle_of(slab, means.amount, table);
         }
         for (var is_shown = means.amount > 0.0 && !is_whole; is_shown; is_shown = false) {
             let seen = look_at(means, segment.first, segment.last, slab.own, table, light);
@@ -233,13 +255,13 @@ fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
         return result;
     }
     let alpha = colored(vec3f(0.0), slab.own).a;
-    var segments = SEGMENTS;
+    var seen_slab = slab;
     if SEGMENTS > 1u {
         let table = table_at(slab.at, 0.5 * (part.x + part.y), 0.0);
-        segments = select(1u, SEGMENTS, slab_integral(table, slab.first.x, slab.last.x).amount > 0.0);
+        seen_slab.middle = middle_of(slab, slab_integral(table, slab.first.x, slab.last.x).amount, table);
     }
-    for (var i = 0u; i < segments; i += 1u) {
-        let segment = segment_of(slab, i, segments);
+    for (var i = 0u; i < SEGMENTS; i += 1u) {
+        let segment = segment_of(seen_slab, i);
         let far = segment.near + segment.width;
         let start = max(slab.ray.x - segment.near, 0.0) / segment.width;
         let end = 1.0 - max(far - slab.ray.y, 0.0) / segment.width;

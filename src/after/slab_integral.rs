@@ -12,7 +12,7 @@
 //!
 //! | entries | hold |
 //! |---|---|
-//! | `HEAD` | (cells, bins, the minimum and maximum number with an opacity, for `surface` of one half); (the minimum number, bins per number, the maximum number, where bins begin) |
+//! | `HEAD` | (cells, bins, the minimum and maximum number with an opacity, for `surface` of linear slabs of one half); (the minimum number, bins per number, the maximum number, where bins begin) |
 //! | bins | (first cell, last cell, 0, 0) that a number in this bin may lie in |
 //! | cells · `CELL` | (minimum number, 1/width, α, α's rise over the cell); (C, maximum number); (C's rise, 0) |
 //! | levels · cells · `SUM` | (∫m, ∫m·(x - middle), middle, 0); (∫m·C, 0) between the cell and the middle of its block |
@@ -22,7 +22,7 @@
 use glam::{DVec3, Vec3, Vec4};
 
 use super::normalization::Normalization;
-use crate::settings::splatting::{Compositing, Splatting};
+use crate::settings::splatting::{Compositing, SlabProfile, Splatting};
 use crate::settings::transfer_function::{Ramp, Tables};
 
 /// The number of entries before the bins.
@@ -57,6 +57,13 @@ struct Sums {
     color: DVec3,
 }
 
+/// A slab whose mean amount is below this, and whose numbers reach the range of those with an opacity by less than a hair, is told by rounding alone from one
+/// that shows nothing: its middle is not bent. Many volumes have a background of exactly the value at which opacity begins.
+pub(crate) const MIN_BENT: f32 = 1e-3;
+
+/// The integral over the widest iso-range of a single value, of which `surface` makes a cell; SPEC §9's mean amount is 0 there.
+pub(crate) const SINGLE: f32 = 5e-7;
+
 /// How far beyond all values the middles of cubic slabs may lie, in lengths of the values' range: more than `|∇f0 - ∇f1|·D/8` with the steepest kernel, the widest
 /// slabs and the most oblique rays.
 const MOST_BEYOND: f64 = 1024.0;
@@ -78,8 +85,9 @@ pub fn table(tables: &Tables, splatting: &Splatting, numbers: &Normalization) ->
     let [least, greatest] = numbers.range.map(f64::from);
     let [least, greatest] = if greatest > least { [least, greatest] } else { [first, end] };
     let per_number = bins as f64 / (greatest - least);
-    // A surface is where the opacity is one half.
-    let is_shown = |alpha: f64| if compositing == Compositing::Surface { alpha >= 0.5 } else { alpha > 0.0 };
+    // A surface is where the opacity is one half. The middle of a cubic slab that shows anything may be there where neither plane is.
+    let is_half = compositing == Compositing::Surface && splatting.slab_profile == SlabProfile::Linear;
+    let is_shown = |alpha: f64| if is_half { alpha >= 0.5 } else { alpha > 0.0 };
     let shown = cells.iter().filter(|cell| is_shown(cell.alpha[0].max(cell.alpha[1])));
     // Nothing lies between these if nothing has such an opacity.
     let shown = shown.fold([f64::from(f32::MAX), f64::from(f32::MIN)], |[low, high], cell| {

@@ -48,7 +48,7 @@ const MAX_PASSES_OF_BRICK: u32 = 158;
 const MAX_PASSES_OF_BRICK_OF_VALUES: u32 = MAX_PASSES_OF_BRICK - 40;
 
 /// The number of passes that classify and composite four slabs of a block.
-const MAX_PASSES_OF_SLABS: u32 = 400;
+const MAX_PASSES_OF_SLABS: u32 = 200;
 
 /// The number of passes that add the sheets of these slabs to those of other layers.
 const MAX_PASSES_OF_SUMS: u32 = 64;
@@ -74,7 +74,7 @@ pub struct Passes {
     pub per_group: u32,
     /// The passes of a brick.
     pub per_brick: u32,
-    /// The passes to look up a voxel's control points in memory; where values are gathered, to find a surface in a slab.
+    /// The passes to look up a voxel's control points in memory; where values are gathered, to find a surface in a slab, and of a slab's second half.
     pub search: u32,
 }
 

@@ -4,18 +4,22 @@ use crate::rasterizer::request::{After, FrameRequest};
 use crate::settings::splatting::Compositing;
 
 /// Before splatting those to look up a voxel's control points, where all ramps are searched in memory if any is, because threads hold at most one point each; after
-/// splatting those to find a surface in a slab.
+/// splatting those to find a surface in a slab, and those of a slab's halves.
 pub(super) fn of(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
     if let Some(after) = &request.after {
         let is_surface = request.splatting.compositing == Compositing::Surface;
-        return if is_surface { surface_passes(request, after, by_label) } else { 0 };
+        let of_profile = PASSES_OF_HALVES * (request.splatting.segments() - 1);
+        return of_profile + if is_surface { surface_passes(request, after, by_label) } else { 0 };
     }
     let channels = request.ramps.channels;
     let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.least_lanes);
     let searches = 1 + lengths.iter().map(|&points| of_search(points)).sum::<u32>();
     if in_memory { channels * (1 + searches) } else { 0 }
 }
+
+/// The passes of a slab's second half, and those to find whether the slab shows anything: two more integrals, each with two searches, and their loops.
+const PASSES_OF_HALVES: u32 = 16;
 
 /// The number of points that are tested for a surface in a cell of a table: `SAMPLES` of `shaders/shared/first_surface.wgsl` and one more, or its two ends.
 const TESTED_POINTS: [u32; 2] = [2, 33];
@@ -31,11 +35,16 @@ fn surface_passes(request: &FrameRequest, after: &After, by_label: bool) -> u32 
     let of_test = 1 + if is_graded { 3 + of_search(points) } else { 2 };
     let tested = TESTED_POINTS[usize::from(is_graded)];
     let cells = request.ramps.cells();
-    let of_cells = cells * (4 + tested * of_test) + HALVINGS * of_test + 2 * (2 + of_search(cells.max(1)));
-    // Where each voxel has its own table, the way through its cell is searched by itself.
+    let of_cells = |segments: u32| {
+        segments * (cells * (4 + tested * of_test) + 2 * (2 + of_search(cells.max(1)))) + HALVINGS * of_test
+    };
+    let segments = request.splatting.segments();
+    if !by_label {
+        return of_cells(segments);
+    }
+    // Where each voxel has its own table, the way through its cell is searched by itself, and so is each part of one that lies in two segments.
     let borders = after.planes.slab_step(&request.view).to_array().map(|step| step as u32 + 2);
-    let of_segment = if by_label { borders.iter().sum::<u32>().saturating_mul(1 + of_cells) } else { of_cells };
-    of_segment.saturating_mul(request.splatting.segments())
+    (borders.iter().sum::<u32>() + segments - 1).saturating_mul(1 + of_cells(1))
 }
 
 /// The passes through loops of a binary search among `points` control points.

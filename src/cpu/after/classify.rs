@@ -9,6 +9,7 @@ use super::frame::Frame;
 use super::planes::Plane;
 use super::sheet::SlabSheet;
 use super::slab_integral::Means;
+use crate::after::slab_integral;
 use crate::cpu::count::bits;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::cut::TileRays;
@@ -269,19 +270,20 @@ impl Frame<'_> {
         self.integrals.means(simd, lanes, values, table_of)
     }
 
-    /// Which of eight pixels show anything in a slab.
+    /// The means of eight pixels in a slab.
     #[inline(always)]
-    pub(super) fn visible<S: Simd>(&self, simd: S, slab: &Slab<S>, looks: &Looks<'_>, at: [usize; 2]) -> u32 {
+    pub(super) fn means<S: Simd>(&self, simd: S, slab: &Slab<S>, looks: &Looks<'_>, at: [usize; 2]) -> Means<S> {
         let labels = self.slab_labels(slab.number, slab.lanes, looks, at);
-        self.means_between(simd, slab.lanes, slab.values, &labels).visible(simd, slab.lanes)
+        self.means_between(simd, slab.lanes, slab.values, &labels)
     }
 
-    /// The number in the middle of a cubic slab (SPEC §9): that of the cubic through the values and slopes at its planes.
+    /// The number in the middle of a cubic slab (SPEC §9), given its mean amount: that of the cubic through the values and slopes at its planes; on the line between
+    /// them where only rounding tells the slab from one that shows nothing.
     #[inline(always)]
     pub(super) fn middle<S: Simd>(
         &self,
         simd: S,
-        [f0, f1]: [f32x8<S>; 2],
+        ([f0, f1], amount): ([f32x8<S>; 2], f32x8<S>),
         [near, far]: &[[f32x8<S>; 3]; 2],
         looks: &Looks<'_>,
         [column, row]: [usize; 2],
@@ -292,7 +294,14 @@ impl Frame<'_> {
         if let Some(lengths) = &looks.rays.weights {
             bend *= f32x8::from_slice(simd, &lengths[row][column..column + LANES]);
         }
-        (f0 + f1) * 0.5 + bend
+        let splat = |number: f32| f32x8::splat(simd, number);
+        let ([least, greatest], low, high) = (self.integrals.shown, f0.min(f1), f0.max(f1));
+        let is_at_end = high.simd_lt(splat(least + self.hair)) | low.simd_gt(splat(greatest - self.hair));
+        let mut is_straight = is_at_end & amount.simd_lt(splat(slab_integral::MIN_BENT));
+        if self.compositing == Compositing::Surface {
+            is_straight |= (amount * (high - low)).simd_lt(splat(slab_integral::SINGLE));
+        }
+        (f0 + f1) * 0.5 + is_straight.select(splat(0.0), bend)
     }
 
     /// What the segments of a slab add to eight pixels, by channel; `None` if none of them shows anything there.
@@ -326,7 +335,7 @@ impl Frame<'_> {
                     gradients = self.gradients(simd, slab, visible, planes, [column, row]);
                 }
                 if self.segments > 1 {
-                    middle = self.middle(simd, slab.values, &gradients, looks, [column, row]);
+                    middle = self.middle(simd, (slab.values, means.amount), &gradients, looks, [column, row]);
                     values = [first, middle];
                     continue;
                 }

@@ -56,11 +56,11 @@ impl Frame<'_> {
         let gradients = lines.map(|gradient| gradient.map(f32x8::to_array));
         let own = self.slab_colors(simd, slab, slab.lanes, planes, [column, row]);
         let own = own.map(|own| own.map(f32x8::to_array));
-        let (bent, middles) = match self.segments {
-            1 => (0, [0.0; LANES]),
+        let middles = match self.segments {
+            1 => [0.0; LANES],
             _ => {
-                let middle = self.middle(simd, slab.values, &lines, looks, [column, row]);
-                (self.visible(simd, slab, looks, [column, row]), middle.to_array())
+                let amount = self.means(simd, slab, looks, [column, row]).amount;
+                self.middle(simd, (slab.values, amount), &lines, looks, [column, row]).to_array()
             }
         };
         let (mut found, mut places, mut colors) = (0, [0.0; LANES], [[0.0; LANES]; 3]);
@@ -74,7 +74,7 @@ impl Frame<'_> {
             let at = [looks.origin[0] + column + lane, looks.origin[1] + row];
             let middle = self.value(middles[lane]);
             let halves = [([0.0, 0.5], [f0, middle]), ([0.5, 1.0], [middle, f1])];
-            let segments = if bent >> lane & 1 == 1 { &halves[..] } else { &[([0.0, 1.0], [f0, f1])] };
+            let segments = if self.segments > 1 { &halves[..] } else { &[([0.0, 1.0], [f0, f1])] };
             let own_alpha = own.map_or(1.0, |[.., alpha]| alpha[lane].into());
             let surface = segments.iter().find_map(|&(segment, values)| {
                 let part = [start.max(segment[0]), end.min(segment[1])];

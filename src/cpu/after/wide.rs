@@ -48,7 +48,7 @@ impl Frame<'_> {
         let mut visible = [Vec::new(), Vec::new()];
         for (at, lanes) in eights.into_iter().filter(|(_, lanes)| *lanes != 0) {
             let Some(slab) = self.slab(simd, number, lanes, planes, at) else { continue };
-            let lanes = self.visible(simd, &slab, looks, at);
+            let lanes = self.means(simd, &slab, looks, at).visible(simd, slab.lanes);
             for (visible, has_value) in visible.iter_mut().zip(slab.has_value) {
                 visible.push((at, lanes & has_value));
             }

@@ -128,7 +128,7 @@ fn every_key() {
         classification = "before"
         interpolation = "exact"
         slab_width = 0.05
-        slab_profile = "linear"
+        slab_profile = "cubic"
         footprint = "sections"
         compositing = "exponential"
         order = "back-to-front"
@@ -203,7 +203,7 @@ fn every_key() {
             classification: Classification::Before,
             interpolation: Interpolation::Exact,
             slab_width: 0.05,
-            slab_profile: SlabProfile::Linear,
+            slab_profile: SlabProfile::Cubic,
             footprint: FootprintForm::Sections,
             compositing: Compositing::Exponential,
             order: Order::BackToFront,

@@ -8,7 +8,7 @@ use sheetsplat::image::Image;
 use sheetsplat::internals::reference::{self, Host};
 use sheetsplat::internals::view_geometry::ViewGeometry;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Compositing, Gradient, Interpolation, LabelTables, Order, Ramp, Rasterizer};
+use sheetsplat::settings::{Compositing, Gradient, Interpolation, LabelTables, Order, Ramp, Rasterizer, SlabProfile};
 use sheetsplat::stats::Counts;
 use sheetsplat::volume::{Labels, Volume, builtin};
 
@@ -112,7 +112,8 @@ type Change = fn(&mut Scene);
 #[test]
 fn settings_are_the_twins() {
     let gpu = gpu();
-    let cases: [(&str, Change); 15] = [
+    let cases: [(&str, Change); 16] = [
+        ("cubic", |scene| scene.splatting.slab_profile = SlabProfile::Cubic),
         ("thin", |scene| scene.splatting.slab_width = 0.3),
         ("thick", |scene| scene.splatting.slab_width = 3.0),
         ("radius 1.4", |scene| scene.splatting.radius = 1.4),

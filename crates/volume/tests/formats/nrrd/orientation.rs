@@ -41,7 +41,7 @@ fn several_units_and_open_spacings() {
     assert_near(volume.spacing(), DVec3::new(0.25, 0.25, 0.5));
     assert_eq!(volume.unit(), Some("µm"));
     assert_warned(&warnings, "units: \"um\", \"um\", \"nm\": lengths are converted to µm");
-    let directions = "space: RAS\nspace directions: (0,0.5,0) (250,0,0) (0,0,0.5)\nspace origin: (1000,2,3)";
+    let directions = "space: RAS\nspace directions: (0,0.5,0) (-250,0,0) (0,0,0.5)\nspace origin: (1000,2,3)";
     let (volume, _) = open(&format!("{directions}\nspace units: \"nm\" \"um\" \"um\""));
     assert_near(volume.spacing(), DVec3::new(500.0, 250.0, 500.0));
     assert_near(volume.orientation().unwrap().origin, DVec3::new(1000.0, 2000.0, 3000.0));
