@@ -157,7 +157,7 @@ struct Inner {
     bytes_read: Option<BytesRead>,
     outputs: Outputs,
     inputs: Option<Inputs>,
-    /// What samples have lost since the last warning.
+    /// The errors of samples that were read since the last warning.
     rounding: Mutex<Rounding>,
     /// Whether a file that is read by boxes has warned of that.
     has_warned: AtomicBool,
@@ -219,7 +219,7 @@ impl Access {
         }
     }
 
-    /// What samples have lost since the last call.
+    /// The errors of samples that were read since the last call.
     pub(super) fn take_rounding(&self) -> Rounding {
         std::mem::take(&mut self.0.rounding.lock().unwrap_or_else(PoisonError::into_inner))
     }

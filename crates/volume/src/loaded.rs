@@ -46,7 +46,7 @@ pub(super) struct Loaded<T: Voxel> {
     pub values: T::Many,
 }
 
-/// What a file says of single values.
+/// The names and colours that a file gives to single values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Legend {
     /// The values' names, if they are labels.
@@ -101,7 +101,7 @@ impl<T: Voxel> Loaded<T> {
         }
     }
 
-    /// What the file, of some format, states about one of its channels, `number` among those that are read. What concerns all of them is the first one's.
+    /// The facts that the file, of some format, states about one of its channels, `number` among those that are read. The first channel has the facts that concern all.
     pub(super) fn facts(&self, format: &'static str, channel: usize, number: usize) -> StoreFacts {
         let Self { series, spacing, unit, .. } = self;
         let Legend { names: label_names, palette } = self.legend(channel, number);

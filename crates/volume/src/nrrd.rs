@@ -166,7 +166,7 @@ impl Header {
         let words: Vec<&str> =
             if words.contains('(') { vector_words(&words) } else { words.split_whitespace().collect() };
         let is_none = |word: &str| ["none", "nan"].contains(&word);
-        // Of several, the last that is not in space, or else the last.
+        // If there are several, this is the last one that is not in space, or else the last one.
         let in_no_space = |&axis: &usize| {
             kinds.get(axis).is_some_and(|kind| !in_space(kind)) || words.get(axis).is_some_and(|word| is_none(word))
         };

@@ -1,4 +1,4 @@
-//! What samples lose when they become values, which are `f32`: whole numbers beyond 24 bits are rounded.
+//! The errors of samples that become values, which are `f32`: whole numbers beyond 24 bits are rounded.
 
 use std::path::Path;
 
@@ -16,9 +16,9 @@ const NOTICEABLE: f64 = 1.0 / 65536.0;
 /// The largest errors of the values of some samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Rounding {
-    /// That of whole numbers.
+    /// The largest error of whole numbers.
     whole: f64,
-    /// That of any numbers of 64 bits; infinite if one lies beyond what `f32` holds.
+    /// The largest error of any numbers of 64 bits; infinite if one lies beyond what `f32` holds.
     any: f64,
 }
 
@@ -27,7 +27,7 @@ impl Rounding {
     pub(super) fn of<S: Sample>(samples: impl Iterator<Item = S>) -> Self {
         let error = |sample: S| {
             let (exact, value) = (sample.to_f64(), sample.to_f32());
-            // That of NaN and infinity, which are holes, is none.
+            // NaN and infinity become holes, which have no error.
             let any = if exact.is_finite() { (exact - f64::from(value)).abs() } else { 0.0 };
             // Beyond its exact whole numbers, no fraction is left for an `f64` to tell whole numbers by.
             let may_be_id = S::IS_WHOLE || exact.abs() <= EXACT_F64;

@@ -31,7 +31,7 @@ impl Grid {
         self.turned
     }
 
-    /// A voxel's own indices in its file, whose first axis may be turned; and of these the voxel. What lies outside stays outside.
+    /// The indices that a voxel has in its file, whose first axis may be turned. The same function leads back from them. A voxel outside stays outside.
     pub fn file_voxel(&self, voxel: UVec3) -> UVec3 {
         let x = if self.turned { (self.dims.x - 1).wrapping_sub(voxel.x) } else { voxel.x };
         UVec3::new(x, voxel.y, voxel.z)
@@ -86,6 +86,7 @@ impl Volume {
 }
 
 /// Whether a store's orientation has left-handed axes.
+#[cfg(feature = "zarr")]
 pub(super) fn is_left_handed(store: &dyn Store) -> bool {
     store.facts().orientation.is_some_and(|orientation| orientation.is_mirrored())
 }
@@ -185,7 +186,7 @@ impl Store for TurnedStore {
         self.store.range(level)
     }
 
-    /// That of all chunks which share voxels with it.
+    /// The range of all chunks which share voxels with it.
     fn chunk_range(&self, level: usize, chunk: UVec3) -> Option<[f32; 2]> {
         let ranges = self.chunks(level, chunk).map(|chunk| self.store.chunk_range(level, chunk));
         ranges.reduce(|one, other| Some(union(one?, other?)))?

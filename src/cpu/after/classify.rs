@@ -304,7 +304,7 @@ impl Frame<'_> {
         (f0 + f1) * 0.5 + is_straight.select(splat(0.0), bend)
     }
 
-    /// What the segments of a slab add to eight pixels, by channel; `None` if none of them shows anything there.
+    /// The amounts that the segments of a slab add to eight pixels, by channel; `None` if none of them shows anything there.
     #[inline(always)]
     fn amounts<S: Simd>(
         &self,

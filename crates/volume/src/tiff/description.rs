@@ -96,11 +96,11 @@ impl Calibration {
         // ImageJ ignores the sign of the spacing.
         let between = fields.value("spacing", "a finite number", |text| match text {
             None => Some(None),
-            // A distance of 0 is none.
+            // A spacing of 0 counts as not stated.
             Some(text) => number(text).map(|spacing| Some(spacing.abs()).filter(|&spacing| spacing > 0.0)),
         })?;
         let sizes = pixels_per_unit(pages).map_or([1.0; 2], |[x, y]| [1.0 / x, 1.0 / y]);
-        // Those along y and z are that along x if they are not stated.
+        // Units along y and z that are not stated are the one along x.
         let names = units.map(|name| name.or(units[0]));
         let stated = DVec3::new(sizes[0], sizes[1], between.unwrap_or(1.0));
         let (mut length_unit, factors) = shared((&pages.path, "unit, yunit, zunit"), stated, names);
