@@ -339,7 +339,7 @@ impl Default for Splatting {
             classification: Classification::Before,
             interpolation: Interpolation::Smooth,
             slab_width: 1.0,
-            slab_profile: SlabProfile::Linear,
+            slab_profile: SlabProfile::Cubic,
             footprint: FootprintForm::SummedArea,
             compositing: Compositing::Linear,
             order: Order::FrontToBack,

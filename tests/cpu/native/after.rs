@@ -339,7 +339,7 @@ fn holes_and_labels_against_the_twin() {
 fn culling_keeps_its_guarantee() {
     let mut random = Random(2001);
     let mut culled = 0;
-    for case in 0..40 {
+    for case in 0..60 {
         let (volume, mut scene) = random_after(&mut random);
         let [with, without] = [true, false].map(|culling| {
             scene.splatting.culling = culling;
@@ -355,7 +355,7 @@ fn culling_keeps_its_guarantee() {
         scene.splatting.culling = true;
         assert_eq!(bits(&draw(&volume, &scene).image), bits(&without.image), "case {case}, T = 1, with {scene:?}");
     }
-    assert!(culled > 10, "only {culled} cases cull anything");
+    assert!(culled > 15, "only {culled} cases cull anything");
 }
 
 #[test]
