@@ -22,6 +22,8 @@
 
 // Those of the voxels' own, if they have any.
 @group(0) @binding(15) var colors: texture_2d_array<u32>;
+// The gradients of the membership of labels.
+@group(0) @binding(16) var membership: texture_2d_array<u32>;
 
 fn begin_layer(layer: u32) {}
 

@@ -4,6 +4,7 @@
 // #import shared/brick
 // #import shared/channels
 // #import shared/frame
+// #import shared/gradient
 // #import shared/own_color
 // #import shared/project
 // #import shared/ramps
@@ -24,6 +25,8 @@
 @group(0) @binding(8) var colors: texture_2d_array<u32>;
 // The slots of pages, where voxels are in pages.
 @group(0) @binding(9) var pages: texture_2d_array<u32>;
+// The gradients of the membership of labels.
+@group(0) @binding(10) var membership: texture_2d_array<u32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {

@@ -49,7 +49,7 @@ impl Pick {
             if value.is_nan() {
                 0.0
             } else {
-                tables.alpha(value, volume.gradient(voxel).length()) * volume.alpha_of(index)
+                tables.alpha(value, tables.gradient(volume, voxel).length()) * volume.alpha_of(index)
             }
         };
         let opacities = volume.channels().zip(transfer.channels()).map(opacity).enumerate();

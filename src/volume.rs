@@ -2,8 +2,8 @@
 
 #[doc(inline)]
 pub use sheetsplat_volume::{
-    BytesRead, ChannelDisplay, ChunkProgress, Encoding, Files, Grid, IndexedStore, Inputs, Labels, Orientation,
-    Outputs, PatientSide, RawLayout, ReadOptions, SampleType, Store, StoreFacts, StoreIndex, StoreLevel,
+    BytesRead, ChannelDisplay, ChunkProgress, Encoding, Files, Grid, IndexedStore, Inputs, Labels, Members,
+    Orientation, Outputs, PatientSide, RawLayout, ReadOptions, SampleType, Store, StoreFacts, StoreIndex, StoreLevel,
     StreamedChannel, StreamedLevel, StreamedVolume, Texel, ValueIter, ValueSlice, Values, Volume, VolumeError, builtin,
     open_raw_store, open_store, sample,
 };
@@ -11,8 +11,9 @@ pub use sheetsplat_volume::{
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 pub(crate) use sheetsplat_volume::internals::HollowChannel;
 pub(crate) use sheetsplat_volume::internals::{
-    Access, AdaptedStore, COLOR_BYTES, Resampling, SIZES, SPACING, Selection, check_grids, check_spacing, dims_of,
-    is_address, labels_of, levels, range, raw_store, sample_of_channels, store, stores, written_in,
+    Access, AdaptedStore, COLOR_BYTES, MEMBERSHIP_REACH, Resampling, SIZES, SPACING, Selection, check_grids,
+    check_spacing, dims_of, is_address, labels_of, levels, range, raw_store, sample_of_channels, store, stores,
+    written_in,
 };
 #[cfg(feature = "codecs")]
 pub(crate) use sheetsplat_volume::internals::{npy, npz};

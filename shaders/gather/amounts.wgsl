@@ -9,6 +9,7 @@
 // #import shared/brick
 // #import shared/channels
 // #import shared/frame
+// #import shared/gradient
 // #import shared/own_color
 // #import shared/project
 // #import shared/ramps

@@ -7,12 +7,14 @@
 // Whether any voxel is a hole (SPEC §3); then values are stored as the bits of an f32.
 override HOLES: bool = false;
 
-// The index of the first value of the channel that is read (SPEC §10).
+// The channel that is read (SPEC §10), and the index of its first value.
+var<private> channel_read: u32 = 0u;
 var<private> first_value: u32 = 0u;
 
 // Makes a channel the one that is read, given by its number among those that share sheets.
 fn read_channel(channel: u32) {
-    first_value = (frame.first_channel + channel) * voxel_count();
+    channel_read = frame.first_channel + channel;
+    first_value = channel_read * voxel_count();
 }
 
 fn value_at(index: u32) -> f32 {
@@ -67,11 +69,6 @@ fn half_differences(voxel: vec3u) -> vec3f {
         half_difference(voxel, vec3u(0u, 1u, 0u), voxel.y, frame.dims.y, frame.gradient.y),
         half_difference(voxel, vec3u(0u, 0u, 1u), voxel.z, frame.dims.z, frame.gradient.z),
     );
-}
-
-// The gradient that a voxel's central differences are.
-fn gradient_at(voxel: vec3u) -> Gradient {
-    return gradient_of(half_differences(voxel));
 }
 
 // A gradient given by its half, value per `unit`.

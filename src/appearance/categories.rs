@@ -24,17 +24,19 @@ pub fn distinct(labels: &[u16]) -> Vec<u16> {
 
 /// The distinct values of a volume, ascending, if all of them except holes are labels: whole numbers from 0 to 65535.
 pub fn values(volume: &Volume) -> Option<Vec<u16>> {
-    counts(volume).map(|counts| counts.into_iter().map(|(label, _)| label).collect())
+    counts(volume).map(|counts| counts.iter().map(|&(label, _)| label).collect())
 }
 
 /// The labels of [`values`], each with its number of voxels.
-fn counts(volume: &Volume) -> Option<Vec<(u16, u64)>> {
+fn counts(volume: &Volume) -> Option<&[(u16, u64)]> {
     let values = volume.values();
-    if !values.par_iter().all(|value| f32::from(value as u16) == value || value.is_nan()) {
-        return None;
-    }
-    let counts = histogram(values, 1 << 16, |value| Some(usize::from(value as u16)));
-    Some((0..=u16::MAX).zip(counts).filter(|&(_, count)| count > 0).collect())
+    volume.label_facts().counts(|| {
+        if !values.par_iter().all(|value| f32::from(value as u16) == value || value.is_nan()) {
+            return None;
+        }
+        let counts = histogram(values, 1 << 16, |value| Some(usize::from(value as u16)));
+        Some((0..=u16::MAX).zip(counts).filter(|&(_, count)| count > 0).collect())
+    })
 }
 
 /// Whether a volume's values look like labels rather than amounts: at least three labels, in regions with sharp borders. Of the voxels
@@ -54,7 +56,7 @@ pub fn is_label_map(volume: &Volume) -> bool {
     }
     // The lowest of the most frequent values.
     let background = counts.iter().rev().max_by_key(|(_, count)| count).map_or(0.0, |&(label, _)| f32::from(label));
-    Borders::of(volume, background).are_sharp()
+    volume.label_facts().has_sharp_borders(|| Borders::of(volume, background).are_sharp())
 }
 
 /// The maximum number of rows that are examined, and their distance.

@@ -176,7 +176,7 @@ impl<'a> Frame<'a> {
             grid: *grid,
             voxels,
             splatter,
-            shader: Shader::new(&scene.shading, splatting.compositing),
+            shader: Shader::new(&scene.shading, &scene.camera.basis(), splatting.compositing),
             compositor,
             rays: RayMode::new(scene, &view, grid, surfaces),
             drawn: drawn.renewed(bricks, &view),

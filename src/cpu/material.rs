@@ -11,7 +11,7 @@ use crate::lists::brick;
 use crate::lists::brick::{BRICK_VOXELS, Brick};
 use crate::settings::shading::MIN_GRADIENT;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::Volume;
+use crate::volume::{Members, Volume};
 
 /// The maximum number of bricks of one channel whose materials are kept, 2 KiB for each. Those of other bricks are computed again in every tile in which a voxel is
 /// visible.
@@ -100,12 +100,15 @@ impl Material {
         let index = volume.grid().index_of(voxel);
         let value = f64::from(volume.values().at(index as usize));
         let tables = transfer.tables(volume.label(index));
-        let gradient = volume.gradient(voxel);
+        let gradient = tables.gradient(volume, voxel);
         let magnitude = gradient.length();
         let own = volume.color(index);
         let color = own.map_or_else(|| tables.color.at(value), DVec4::truncate);
         let opacity = own.map_or(1.0, |color| color.w);
-        let normal = if magnitude < MIN_GRADIENT { DVec3::ZERO } else { gradient / -magnitude };
+        let of_label = tables.members.filter(|&of| of == Members::OfLabels);
+        let facing = of_label.map_or(gradient, |of| volume.membership_gradient(of, voxel));
+        let length = facing.length();
+        let normal = if length < MIN_GRADIENT { DVec3::ZERO } else { facing / -length };
         Self {
             color: color.as_vec3().to_array(),
             alpha: if value.is_nan() { 0.0 } else { (tables.alpha(value, magnitude) * opacity) as f32 },

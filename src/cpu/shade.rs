@@ -6,8 +6,8 @@ use glam::DVec3;
 
 use super::material::Material;
 use super::vector::{LANES, optical_depth, power};
-use crate::error::setting::scaled;
-use crate::settings::shading::{Light, MAX_SHADING, Shading};
+use crate::settings::camera::ViewBasis;
+use crate::settings::shading::{MAX_SHADING, Shading};
 use crate::settings::splatting::Compositing;
 
 /// Up to eight voxels to be shaded, by lane.
@@ -57,14 +57,11 @@ pub(super) struct Shader {
 }
 
 impl Shader {
-    pub(super) fn new(shading: &Shading, compositing: Compositing) -> Self {
+    pub(super) fn new(shading: &Shading, basis: &ViewBasis, compositing: Compositing) -> Self {
         let capped = |weight: f64| weight.min(MAX_SHADING) as f32;
         Self {
             is_enabled: shading.enabled,
-            to_light: match shading.light {
-                Light::Headlight => None,
-                Light::Direction(direction) => Some(scaled(direction).normalize().as_vec3().to_array()),
-            },
+            to_light: shading.light.direction(basis).map(|to_light| to_light.as_vec3().to_array()),
             ambient: capped(shading.ambient),
             diffuse: capped(shading.diffuse),
             specular: capped(shading.specular),

@@ -11,9 +11,10 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::brick_lists::{BrickLists, SettledBricks};
 use crate::gpu::counts::{GroupSlabs, Totals};
 use crate::gpu::gpu_volume::GpuVolume;
+use crate::gpu::membership;
 use crate::gpu::ramps::Stored;
 use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks, opaque_values};
-use crate::gpu::volume_texture::{OwnColors, Pages};
+use crate::gpu::volume_texture::{OwnColors, Pages, VolumeTexture};
 use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
 use crate::lists::classify::{TakingPart, brick_list, channels, in_rows};
@@ -41,6 +42,8 @@ pub struct ClassifiedVolume {
     classification: Classification,
     /// How the images of channels become one, if they have images of their own.
     joining: Option<Joining>,
+    /// The gradients of the membership of labels, where voxels are shaded by them.
+    membership: Option<Arc<VolumeTexture>>,
     /// With [`Classification::After`] which bricks the lists hold, once a frame asked for them.
     shown: Option<ShownBricks>,
 }
@@ -85,6 +88,7 @@ impl ClassifiedVolume {
             revision: 0,
             classification,
             joining: Joining::of(compositing, classification),
+            membership: None,
             shown: None,
         };
         let bricks = classified.taking_part();
@@ -192,11 +196,17 @@ impl ClassifiedVolume {
     /// Uploads what has changed.
     ///
     /// # Errors
-    /// If the volume's labels exceed the device's limits.
+    /// If the volume's labels, or their gradients of membership, exceed the device's limits.
     pub(crate) fn flush(&mut self, device: &Device, queue: &Queue) -> Result<(), RenderError> {
         if self.needs_labels() {
             self.volume.upload_labels(device, queue)?;
         }
+        self.membership = match membership::shaded(self.volume(), &self.transfer) {
+            Some(shaded) if self.classification == Classification::Before => {
+                Some(self.volume.membership(queue, &shaded)?)
+            }
+            _ => None,
+        };
         self.lists.iter_mut().for_each(|list| list.flush(device, queue));
         Ok(())
     }
@@ -234,6 +244,11 @@ impl ClassifiedVolume {
     /// The labels of all channels on the GPU, if shading a layer needs them.
     pub(crate) fn labels(&self, layer: &Layer) -> Option<&TextureView> {
         self.volume.labels().filter(|_| self.shades_by_label(layer))
+    }
+
+    /// The gradients of the membership of labels on the GPU, if voxels are shaded by them.
+    pub(crate) fn membership(&self) -> Option<&TextureView> {
+        self.membership.as_ref().map(|texture| &texture.view)
     }
 
     /// Whether shading a layer needs labels.

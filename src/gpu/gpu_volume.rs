@@ -11,6 +11,7 @@ use crate::error::setting::SettingError;
 use crate::gpu::all_channels::one_after_the_other;
 use crate::gpu::coefficients::Coefficients;
 use crate::gpu::fault::scoped;
+use crate::gpu::membership::{self, Shaded};
 use crate::gpu::ramps::Stored;
 use crate::gpu::volume_texture::{OwnColors, Pages, ValueFormat, VolumeTexture};
 use crate::lists::brick::BrickList;
@@ -37,6 +38,8 @@ struct Shared {
     numbers: OnceLock<Vec<Normalization>>,
     /// Those of the kernel that was last asked for.
     coefficients: Mutex<Option<KeptCoefficients>>,
+    /// The gradients of membership of the labels that were last asked for.
+    membership: Mutex<Option<KeptMembership>>,
     /// Where the volume holds no voxels, and pages of them are on the device.
     pages: Option<Paged>,
 }
@@ -61,6 +64,9 @@ pub(crate) struct Paged {
 
 /// The coefficients for a kernel's radius and falloff.
 type KeptCoefficients = ((f64, f64), Arc<Coefficients>);
+
+/// The gradients of membership for what is shaded by them.
+type KeptMembership = (Vec<Shaded>, Arc<VolumeTexture>);
 
 impl GpuVolume {
     /// Uploads a volume's values: for each channel 4 bytes per voxel, or 1 or 2 if they are whole numbers in a range of 256 or 65536, and for a channel of
@@ -104,6 +110,7 @@ impl GpuVolume {
             value_list,
             numbers,
             coefficients,
+            membership: Mutex::default(),
             pages: None,
         }))
     }
@@ -120,6 +127,7 @@ impl GpuVolume {
             value_list: OnceLock::new(),
             numbers: std::mem::take(&mut pages.numbers).into(),
             coefficients: Mutex::default(),
+            membership: Mutex::default(),
             pages: Some(pages),
         })
     }
@@ -169,7 +177,8 @@ impl GpuVolume {
         let colors = self.shared.colors.as_ref().map(|(texture, _)| texture);
         let textures = [Some(&self.shared.values), colors, self.shared.labels.get()];
         let coefficients = self.kept_coefficients().as_ref().map_or(0, |(_, kept)| kept.gpu_bytes());
-        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients
+        let membership = self.kept_membership().as_ref().map_or(0, |(_, kept)| kept.gpu_bytes);
+        textures.into_iter().flatten().map(|texture| texture.gpu_bytes).sum::<u64>() + coefficients + membership
     }
 
     /// The volume's device.
@@ -242,6 +251,25 @@ impl GpuVolume {
         let of_channel =
             |channel: &Volume| Normalization::of(channel.values().iter()).unwrap_or(Normalization::new([0.0; 2]));
         self.shared.numbers.get_or_init(|| self.shared.volume.channels().map(of_channel).collect())
+    }
+
+    fn kept_membership(&self) -> MutexGuard<'_, Option<KeptMembership>> {
+        self.shared.membership.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The gradients of membership for what is shaded by them, uploaded at the first request. Those of the previous one are dropped.
+    ///
+    /// # Errors
+    /// If they need more layers than the device's textures have, or the device fails.
+    pub(crate) fn membership(&self, queue: &Queue, shaded: &[Shaded]) -> Result<Arc<VolumeTexture>, RenderError> {
+        if let Some((_, kept)) = self.kept_membership().as_ref().filter(|(of, _)| of == shaded) {
+            return Ok(Arc::clone(kept));
+        }
+        let Shared { device, volume, .. } = &*self.shared;
+        let uploaded = scoped(device, || membership::upload(device, queue, volume, shaded))??;
+        let uploaded = Arc::new(uploaded);
+        *self.kept_membership() = Some((shaded.to_vec(), Arc::clone(&uploaded)));
+        Ok(uploaded)
     }
 
     fn kept_coefficients(&self) -> MutexGuard<'_, Option<KeptCoefficients>> {

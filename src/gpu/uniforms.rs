@@ -9,7 +9,6 @@ use super::layout::{Cut, FieldPlanes, Frame, Gather, SheetGroup};
 use super::ramps::Ramps;
 use super::volume_texture::ValueFormat;
 use crate::after::normalization::Normalization;
-use crate::error::setting::scaled;
 use crate::geometry::grid_warp::{self, FootprintMap};
 use crate::geometry::means::RayBox;
 use crate::geometry::plane_geometry::PlaneGeometry;
@@ -36,10 +35,7 @@ pub fn frame(
     scene: &Scene,
 ) -> Frame {
     let to_eye = -view.basis.w;
-    let to_light = match scene.shading.light {
-        Light::Headlight => to_eye,
-        Light::Direction(direction) => scaled(direction).normalize(),
-    };
+    let to_light = scene.shading.light.direction(&view.basis).unwrap_or(to_eye);
     let Shading { enabled, ambient, diffuse, specular, shininess, .. } = scene.shading;
     let matrix = |m: &DMat2| m.to_cols_array().map(|x| x as f32);
     let [color_end, opacity_end, gradient_opacity_end] = ramps.ends;

@@ -166,16 +166,19 @@ impl VolumeTexture {
         uploaded
     }
 
-    /// Uploads the slots of pages.
+    /// Uploads any words: slots of pages, or gradients of membership. `what` names them in errors.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have.
-    #[cfg(not(target_arch = "wasm32"))]
-    pub(crate) fn upload_slots(device: &Device, queue: &Queue, slots: &[u32]) -> Result<Self, RenderError> {
-        let side = side(&device.limits(), "the slots of pages", slots.len() as u64)?;
-        let size = folded(slots.len() as u64, side);
-        let (texture, uploaded) = Self::new(device, "sheetsplat.pages", ValueFormat::Bits, size);
-        fill_from(queue, &texture, slots, |slot| slot);
+    pub(crate) fn upload_words(
+        device: &Device,
+        queue: &Queue,
+        (label, what): (&str, &'static str),
+        words: &[u32],
+    ) -> Result<Self, RenderError> {
+        let side = side(&device.limits(), what, words.len() as u64)?;
+        let (texture, uploaded) = Self::new(device, label, ValueFormat::Bits, folded(words.len() as u64, side));
+        fill_from(queue, &texture, words, |word| word);
         Ok(uploaded)
     }
 

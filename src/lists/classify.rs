@@ -113,7 +113,7 @@ impl<'a> InChannel<'a> {
         let tables = transfer.tables(label);
         volume.alpha_of(index) > 0.0
             && (tables.gradient_opacity.is_none()
-                || tables.alpha(value.into(), volume.gradient(volume.grid().voxel_at(index)).length()) > 0.0)
+                || tables.alpha(value.into(), tables.gradient(volume, volume.grid().voxel_at(index)).length()) > 0.0)
     }
 }
 

@@ -172,6 +172,7 @@ mod tests {
             color: Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(),
             opacity: Ramp::new(opacity.to_vec()).unwrap(),
             gradient_opacity: None,
+            membership: false,
             iso_ranges: iso_ranges.map(<[[f64; 2]]>::to_vec),
             labels: BTreeMap::new(),
             further: Vec::new(),

@@ -71,6 +71,7 @@ mod tests {
                 color: Ramp::new(vec![(0.0, DVec3::ONE)]).unwrap(),
                 opacity: Ramp::new(vec![(0.0, 1.0)]).unwrap(),
                 gradient_opacity: None,
+                membership: false,
                 iso_ranges: Some(vec![iso_range]),
                 labels: BTreeMap::new(),
                 further: Vec::new(),

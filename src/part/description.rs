@@ -109,7 +109,7 @@ impl From<&LabelTables> for OfLabel {
 impl OfLabel {
     fn tables(self) -> Result<LabelTables, String> {
         let (color, opacity) = (self.color.map(color_of).transpose()?, self.opacity.map(opacity_of).transpose()?);
-        Ok(LabelTables { visible: self.visible, color, opacity, gradient_opacity: None })
+        Ok(LabelTables { visible: self.visible, color, opacity, ..LabelTables::default() })
     }
 }
 

@@ -74,6 +74,8 @@ pub struct CullBuffers<'a> {
     pub colors: Option<OwnColors<'a>>,
     /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
+    /// The gradients of the membership of labels, if any channel is shaded by them.
+    pub membership: Option<&'a TextureView>,
     /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// The occlusion buffer.
@@ -223,6 +225,7 @@ impl Cull {
                     channels: shared.channels,
                     colors: shared.colors,
                     labels: shared.labels,
+                    membership: shared.membership,
                     control_points: shared.control_points,
                     places: &fresh,
                     args: &fresh_args,

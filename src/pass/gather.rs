@@ -42,6 +42,8 @@ pub struct GatherMode {
     channels: u32,
     /// The number in the voxels' own colours that stands for 1; 0 if they have none.
     full_color: u32,
+    /// Whether any channel has normals of the membership of labels.
+    membership: bool,
     rays: RayMode,
     /// How values are gathered on slab planes; `None` if colours are.
     planes: Option<PlaneMode>,
@@ -103,6 +105,7 @@ impl GatherMode {
             page_bits,
             channels,
             full_color,
+            membership: false,
             rays,
             planes,
             sheets_per_test,
@@ -113,6 +116,11 @@ impl GatherMode {
     /// The same mode for another number of channels, and for voxels with colours of their own (SPEC §10).
     pub fn with_channels(self, channels: u32, colors: Option<OwnColors<'_>>) -> Self {
         Self { channels, full_color: colors.map_or(0, |own| own.full), ..self }
+    }
+
+    /// The same mode with or without normals of the membership of labels.
+    pub fn with_membership(self, membership: bool) -> Self {
+        Self { membership, ..self }
     }
 
     /// The same mode for voxels in pages.
@@ -155,6 +163,8 @@ pub struct GatherBuffers<'a> {
     pub colors: Option<OwnColors<'a>>,
     /// The volume's labels, for a mode that needs them.
     pub labels: Option<&'a TextureView>,
+    /// The gradients of the membership of labels, for a mode that needs them.
+    pub membership: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
     /// [`PatchBins::half_boxes`](crate::lists::patch_bins::PatchBins::half_boxes), `[[f32; 2]]`.
@@ -222,6 +232,9 @@ impl Gather {
         if let Some(GatheredPlanes { planes, coefficients }) = buffers.planes {
             resources.push(("planes_of", whole(planes)));
             resources.push(("coefficients", wgpu::BindingResource::TextureView(coefficients.unwrap_or(values))));
+        } else {
+            let membership = buffers.membership.unwrap_or(labels);
+            resources.push(("membership", wgpu::BindingResource::TextureView(membership)));
         }
         resources.extend(carried.map(|carried| ("carried", whole(carried))));
         stage.bind(device, &resources)
@@ -261,6 +274,8 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         slots.push(("planes_of", uniform::<[FieldPlanes; MOST_LAYERS]>(stage, false)));
         slots.push(("coefficients", texture_of_integers(stage, TextureViewDimension::D2Array)));
         slots.push(("carried", storage::<[u32; 4]>(stage, false)));
+    } else {
+        slots.push(("membership", texture_of_integers(stage, TextureViewDimension::D2Array)));
     }
     let mut constants = vec![
         ("THREADS", f64::from(threads(device))),
@@ -296,7 +311,8 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
             shaders::GATHER_PLANES
         }
         None => {
-            constants.extend([("ECONOMIES", flag(mode.economies)), ("QUEUE_COLORS", 1.0)]);
+            let membership = ("MEMBERSHIP", flag(mode.membership));
+            constants.extend([("ECONOMIES", flag(mode.economies)), membership, ("QUEUE_COLORS", 1.0)]);
             shaders::GATHER
         }
     };
@@ -318,8 +334,8 @@ impl PlaneMode {
     /// The number of sums of a pixel on a slab plane (SPEC §9).
     fn sums(&self) -> u32 {
         let of_values = match self.gradient {
-            Gradient::Differences => 5,
             Gradient::Kernel => 8,
+            _ => 5,
         };
         of_values + if self.own_colors { 4 } else { 0 }
     }

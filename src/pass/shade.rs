@@ -28,6 +28,7 @@ struct ShadeMode {
     channels: u32,
     /// The number in the voxels' own colours that stands for 1; 0 if they have none.
     full_color: u32,
+    membership: bool,
 }
 
 /// The buffers that the stage reads and writes.
@@ -49,6 +50,8 @@ pub struct ShadeBuffers<'a> {
     pub colors: Option<OwnColors<'a>>,
     /// The volume's labels, if any label has its own ramps.
     pub labels: Option<&'a TextureView>,
+    /// The gradients of the membership of labels, if any channel is shaded by them.
+    pub membership: Option<&'a TextureView>,
     /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// `[u32]`: the places.
@@ -88,6 +91,7 @@ impl Shade {
             ("labels", BindingResource::TextureView(labels.unwrap_or(&self.no_labels.view))),
             ("colors", BindingResource::TextureView(buffers.colors.map_or(&self.no_colors.view, |own| own.view))),
             ("pages", BindingResource::TextureView(buffers.pages.map_or(values, |pages| pages.view))),
+            ("membership", BindingResource::TextureView(buffers.membership.unwrap_or(&self.no_labels.view))),
         ];
         let mode = ShadeMode {
             labels: labels.is_some(),
@@ -95,6 +99,7 @@ impl Shade {
             page_bits: page_bits(buffers.pages),
             channels: buffers.channels,
             full_color: buffers.colors.map_or(0, |own| own.full),
+            membership: buffers.membership.is_some(),
         };
         let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
         let stage = Arc::clone(stages.entry(mode).or_insert_with(|| Arc::new(compile(device, mode))));
@@ -107,7 +112,8 @@ impl Shade {
     }
 }
 
-fn compile(device: &Device, ShadeMode { labels, holes, page_bits, channels, full_color }: ShadeMode) -> ComputeStage {
+fn compile(device: &Device, mode: ShadeMode) -> ComputeStage {
+    let ShadeMode { labels, holes, page_bits, channels, full_color, membership } = mode;
     let stage = ShaderStages::COMPUTE;
     let slots = [
         ("frames", uniform::<Frame>(stage, false)),
@@ -120,6 +126,7 @@ fn compile(device: &Device, ShadeMode { labels, holes, page_bits, channels, full
         ("labels", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("colors", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("pages", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("membership", texture_of_integers(stage, TextureViewDimension::D2Array)),
     ];
     let flag = |is_set| f64::from(u8::from(is_set));
     let constants = [
@@ -128,6 +135,7 @@ fn compile(device: &Device, ShadeMode { labels, holes, page_bits, channels, full
         ("PAGE_BITS", f64::from(page_bits)),
         ("CHANNELS", f64::from(channels)),
         ("FULL_COLOR", f64::from(full_color)),
+        ("MEMBERSHIP", flag(membership)),
     ];
     ComputeStage::new(device, shaders::SHADE, "main", &slots, &constants)
 }

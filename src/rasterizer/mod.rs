@@ -115,6 +115,11 @@ impl<'a> FrameInputs<'a> {
         self.volume.labels(&self.request.layer)
     }
 
+    /// The gradients of the membership of labels, if shading needs them.
+    fn membership(&self) -> Option<&'a TextureView> {
+        self.volume.membership()
+    }
+
     /// As [`filled`](bindings::filled).
     fn filled(
         &self,

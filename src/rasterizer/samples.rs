@@ -118,6 +118,7 @@ impl SampleRasterizer {
                 channels: request.ramps.channels,
                 colors: inputs.colors(),
                 labels: inputs.labels(),
+                membership: inputs.membership(),
                 control_points: inputs.control_points,
                 places: &buffers.order,
                 args: &buffers.args,

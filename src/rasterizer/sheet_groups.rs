@@ -143,6 +143,7 @@ impl SheetGroups {
             channels: request.ramps.channels,
             colors,
             labels,
+            membership: inputs.membership(),
             control_points,
             occluded: &self.targets.occluded,
             culled: &self.culled,

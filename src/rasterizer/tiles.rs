@@ -115,6 +115,7 @@ impl TileRasterizer {
         let planes = plane_mode(request);
         let mode = GatherMode::of(splatting, planes, view.perspective.is_some(), of_volume, *rays, bins.workgroups)
             .with_channels(request.ramps.channels, colors)
+            .with_membership(inputs.membership().is_some())
             .with_pages(volume.pages());
         let buffers = GatherBuffers {
             frame: inputs.frame,
@@ -128,6 +129,7 @@ impl TileRasterizer {
             pages: volume.pages(),
             colors,
             labels: inputs.labels(),
+            membership: inputs.membership(),
             gathered: &own.gathered,
             half_boxes: &own.half_boxes,
             cut: inputs.cut,

@@ -12,6 +12,7 @@ pub mod footprint;
 pub mod geometry;
 mod host;
 pub mod means;
+pub mod membership;
 pub mod ray_march;
 pub mod resolve;
 mod section;

@@ -2,16 +2,16 @@
 
 use glam::{DVec3, DVec4};
 
-use super::Geometry;
 pub use super::section::Splat;
+use super::{Geometry, membership};
 use crate::error::setting::scaled;
 use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::scene::Scene;
-use crate::settings::shading::{Light, Shading};
+use crate::settings::shading::Light;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::Volume;
+use crate::volume::{Members, Volume};
 
 /// The indices in memory of the voxels that take part, ascending.
 pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {
@@ -54,9 +54,11 @@ pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geo
         0.0 => DVec4::ZERO,
         alpha => {
             let value = f64::from(volume.values().at(index as usize));
-            let of_value = || transfer.tables(volume.label(index)).color.at(value);
-            let base = volume.color(index).map_or_else(of_value, DVec4::truncate);
-            let color = color(&scene.shading, base, volume.gradient(voxel), -geometry.ray(voxel));
+            let tables = transfer.tables(volume.label(index));
+            let base = volume.color(index).map_or_else(|| tables.color.at(value), DVec4::truncate);
+            let gradient =
+                tables.members.map_or_else(|| volume.gradient(voxel), |of| membership::gradient(volume, of, voxel));
+            let color = color(scene, base, gradient, -geometry.ray(voxel));
             color.extend(1.0) * amount(scene.splatting.compositing, alpha)
         }
     };
@@ -72,7 +74,13 @@ fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
         return 0.0;
     }
     let own = volume.color(index).map_or(1.0, |color| color.w);
-    tables.alpha(value, volume.gradient(volume.grid().voxel_at(index)).length()) * own
+    let voxel = volume.grid().voxel_at(index);
+    let gradient = match tables.members {
+        _ if tables.gradient_opacity.is_none() => DVec3::ZERO,
+        Some(of @ Members::OfValues) => membership::gradient(volume, of, voxel),
+        Some(Members::OfLabels) | None => volume.gradient(voxel),
+    };
+    tables.alpha(value, gradient.length()) * own
 }
 
 /// `m`: the amount per unit length (SPEC §5).
@@ -84,13 +92,15 @@ pub fn amount(compositing: Compositing, alpha: f64) -> f64 {
 }
 
 /// `C` of SPEC §3.
-pub fn color(shading: &Shading, color: DVec3, gradient: DVec3, to_eye: DVec3) -> DVec3 {
+pub fn color(Scene { shading, camera, .. }: &Scene, color: DVec3, gradient: DVec3, to_eye: DVec3) -> DVec3 {
     if !shading.enabled {
         return color;
     }
     let normal = if gradient.length() < 1e-12 { DVec3::ZERO } else { -gradient.normalize() };
+    let basis = camera.basis();
     let to_light = match shading.light {
         Light::Headlight => to_eye,
+        Light::UpperLeft => (basis.v / 2.0 - basis.u / 2.0 - basis.w).normalize(),
         Light::Direction(direction) => scaled(direction).normalize(),
     };
     let half = to_light + to_eye;

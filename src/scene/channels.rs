@@ -4,9 +4,11 @@ use std::borrow::Cow;
 
 use glam::DVec3;
 
+use super::load::has_labels_for_values;
 use super::{Channel, Scene, TransferSettings, VolumeSource};
 use crate::appearance::{Preset, categories, channel_color, channel_display, labels_of_several, one_of_several};
 use crate::settings::transfer_function::{Ramp, TransferFunction};
+use crate::settings::{Classification, Gradient};
 use crate::volume::Volume;
 
 impl Scene {
@@ -49,13 +51,38 @@ impl Scene {
         }
         let mut channels = (0..).zip(volume.channels()).map(|(number, channel)| {
             if self.settings_of(number).visible {
-                self.transfer_of(number, volume, channel)
+                let membership = self.takes_membership(volume) && self.is_label_map(number, channel);
+                TransferFunction { membership, ..self.transfer_of(number, volume, channel) }
             } else {
                 TransferFunction::transparent()
             }
         });
         let first = channels.next().unwrap_or_else(TransferFunction::transparent);
         TransferFunction { further: channels.collect(), ..first }
+    }
+
+    /// Whether channels that are label maps take normals of the membership of labels (SPEC §15).
+    fn takes_membership(&self, volume: &Volume) -> bool {
+        match self.shading.gradient {
+            Gradient::Auto => self.classification(volume) == Classification::Before,
+            gradient => gradient == Gradient::Membership,
+        }
+    }
+
+    /// The gradient for a volume: that which is stated, or the one that [`Gradient::Auto`] stands for.
+    pub(super) fn gradient(&self, volume: &Volume) -> Gradient {
+        let is_label_map = |(number, channel): (usize, &Volume)| self.is_label_map(number, channel);
+        match self.shading.gradient {
+            Gradient::Auto if !self.takes_membership(volume) => Gradient::Differences,
+            Gradient::Auto if (0..).zip(volume.channels()).any(is_label_map) => Gradient::Membership,
+            Gradient::Auto => Gradient::Differences,
+            stated => stated,
+        }
+    }
+
+    /// Whether a channel's values are labels.
+    pub(super) fn is_label_map(&self, number: usize, channel: &Volume) -> bool {
+        has_labels_for_values(&self.settings_of(number), channel)
     }
 
     /// The transfer function of a channel, visible or not.

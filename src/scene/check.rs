@@ -1,9 +1,12 @@
 //! Checks of scene settings that their types do not enforce.
 
-use super::{ImageSettings, Scene, TransferSettings};
+use std::borrow::Cow;
+
+use super::{Channel, ImageSettings, Scene, TransferSettings};
 use crate::appearance::Colormap;
 use crate::error::setting::{Interval, SettingError};
 use crate::settings::transfer_function::{Parts, check_iso_ranges, check_labels, check_pieces, check_ramps};
+use crate::settings::{Classification, Gradient};
 use crate::volume::{Volume, check_spacing};
 
 impl ImageSettings {
@@ -92,7 +95,31 @@ impl Scene {
         }
         self.check_pieces()?;
         self.shading.check()?;
+        self.check_membership()?;
         self.splatting.check()
+    }
+
+    /// The key that asks for normals of the membership of labels, if any does; a table's number counts from 0, as in errors.
+    pub(super) fn membership_key(&self) -> Option<String> {
+        if self.shading.gradient == Gradient::Membership {
+            return Some("shading.gradient".to_owned());
+        }
+        let of_channel = |(number, channel): (usize, Cow<'_, Channel>)| {
+            let at = channel.transfer.labels.values().position(|tables| tables.membership)?;
+            Some(format!("{}.label[{at}].gradient", self.transfer_table(number)))
+        };
+        self.channels().enumerate().find_map(of_channel)
+    }
+
+    /// Checks that values are classified before splatting where voxels have normals of the membership of their labels (SPEC §15).
+    pub(super) fn check_membership(&self) -> Result<(), SettingError> {
+        match self.membership_key() {
+            Some(key) if self.splatting.classification == Classification::After => {
+                let found = "\"membership\" with splatting.classification = \"after\"";
+                Err(SettingError::new(key, found, "classification \"before\" with it, or \"differences\""))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Checks that the tables of all channels together are not too long.
@@ -116,6 +143,11 @@ impl Scene {
         }
         for (number, volume) in volume.channels().enumerate() {
             self.settings_of(number).transfer.check_volume_as(&self.transfer_table(number), volume)?;
+        }
+        let is_label_map = |(number, channel): (usize, &Volume)| self.is_label_map(number, channel);
+        if self.shading.gradient == Gradient::Membership && !volume.channels().enumerate().any(is_label_map) {
+            let allowed = "\"differences\" or \"kernel\", or a label map: for labels beside values gradient in [[transfer.label]]";
+            return Err(SettingError::new("shading.gradient", "\"membership\" for values that are no labels", allowed));
         }
         Ok(())
     }

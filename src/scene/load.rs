@@ -35,7 +35,7 @@ pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeE
 }
 
 /// Whether the values of a channel's volume are labels, of which none lies between two others.
-fn has_labels_for_values(settings: &Channel, volume: &Volume) -> bool {
+pub(super) fn has_labels_for_values(settings: &Channel, volume: &Volume) -> bool {
     let is_declared = settings.transfer.preset == Some(Preset::Labels) && volume.labels().is_none();
     categories::is_label_map(volume) || is_declared && categories::values(volume).is_some()
 }

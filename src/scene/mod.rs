@@ -35,6 +35,7 @@ pub use source::VolumeSource;
 pub use transfer_settings::TransferSettings;
 
 use crate::appearance::{Eye, Preset, categories};
+use crate::error::setting::SettingError;
 use crate::lists::extent;
 use crate::settings::camera::Camera;
 use crate::settings::framing::{Extent, Sphere};
@@ -228,7 +229,8 @@ impl Scene {
                 }
             }
         });
-        if is_sharper && splatting.allows_after() { Classification::After } else { Classification::Before }
+        let allows_after = splatting.allows_after() && self.membership_key().is_none();
+        if is_sharper && allows_after { Classification::After } else { Classification::Before }
     }
 
     /// The scene with the preset that fits a volume, [`Preset::None`] if none does, where it states no appearance: no preset, and nothing of a
@@ -253,7 +255,8 @@ impl Scene {
     pub(crate) fn settled(&self, volume: &Volume) -> Self {
         let fitted = self.fitted(volume);
         let splatting = Splatting { classification: fitted.classification(volume), ..fitted.splatting };
-        Self { splatting, camera: fitted.camera_for(volume), ..fitted }
+        let shading = Shading { gradient: fitted.gradient(volume), ..fitted.shading };
+        Self { splatting, shading, camera: fitted.camera_for(volume), ..fitted }
     }
 
     /// `source` is the volume of a scene whose tables name none.
@@ -317,14 +320,14 @@ impl Scene {
             splatting: tables::splatting(splatting, splatting_of_preset)?,
             fitting,
         };
+        let whole = |error: SettingError| origins.invalid(&error.key, &[], error.found.to_string(), error.allowed);
+        scene.check_membership().map_err(whole)?;
         if scene.transfer.preset == Some(Preset::Labels) && scene.splatting.classification == Classification::After {
             let (key, found) = ("splatting.classification", "\"after\" with preset = \"labels\"");
             return Err(origins.invalid(key, &["preset"], found, "\"before\" with it"));
         }
         // Tables too long to be quoted are counted.
-        scene
-            .check_pieces()
-            .map_err(|error| origins.invalid(&error.key, &[], error.found.to_string(), error.allowed))?;
+        scene.check_pieces().map_err(whole)?;
         Ok(scene)
     }
 }

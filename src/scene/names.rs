@@ -16,9 +16,11 @@ pub(crate) const CLASSIFICATIONS: &[(&str, Classification)] =
     &[("before", Classification::Before), ("after", Classification::After)];
 pub(super) const INTERPOLATIONS: &[(&str, Interpolation)] =
     &[("smooth", Interpolation::Smooth), ("exact", Interpolation::Exact), ("auto", Interpolation::Auto)];
+/// Whether a label's normals are those of its membership.
+pub(super) const LABEL_GRADIENTS: &[(&str, bool)] = &[("differences", false), ("membership", true)];
 pub(super) const PROFILES: &[(&str, SlabProfile)] = &[("linear", SlabProfile::Linear), ("cubic", SlabProfile::Cubic)];
 pub(super) const GRADIENTS: &[(&str, Gradient)] =
-    &[("differences", Gradient::Differences), ("kernel", Gradient::Kernel)];
+    &[("differences", Gradient::Differences), ("kernel", Gradient::Kernel), ("membership", Gradient::Membership)];
 pub(super) const FORMS: &[(&str, FootprintForm)] =
     &[("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
 pub(crate) const COMPOSITINGS: &[(&str, Compositing)] = &[

@@ -7,8 +7,8 @@ use glam::DVec3;
 
 use super::color::{rgb, rgba};
 use super::names::{
-    BOXES, CLASSIFICATIONS, COMPOSITINGS, ENDIANS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, PROFILES,
-    RASTERIZERS,
+    BOXES, CLASSIFICATIONS, COMPOSITINGS, ENDIANS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, LABEL_GRADIENTS, METHODS,
+    ORDERS, PROFILES, RASTERIZERS,
 };
 use super::overrides::MAX_CHANNELS;
 use super::reader::{Entry, LABEL, Section};
@@ -309,6 +309,7 @@ fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
         let mut tables = LabelTables::default();
         section.read("visible", &mut tables.visible, Entry::boolean)?;
         ramps(&mut section, &mut tables.color, &mut tables.opacity, &mut tables.gradient_opacity)?;
+        section.read("gradient", &mut tables.membership, |entry| entry.choice(LABEL_GRADIENTS))?;
         section.finish()?;
         tables.check(&key).map_err(|error| origins.refused(error))?;
         labels.insert(label, tables);
@@ -387,11 +388,12 @@ fn vector(entry: &Entry) -> Result<DVec3, SceneError> {
     entry.numbers(Interval::FINITE).map(DVec3::from_array)
 }
 
-/// Reads `"headlight"` or a direction.
+/// Reads a light's name or a direction.
 fn light(entry: &Entry) -> Result<Light, SceneError> {
-    let allowed = "\"headlight\" or [x, y, z]";
+    let allowed = "\"headlight\", \"upper-left\" or [x, y, z]";
     match entry.value.as_str() {
         Some("headlight") => Ok(Light::Headlight),
+        Some("upper-left") => Ok(Light::UpperLeft),
         Some(_) => Err(entry.refused(allowed)),
         None if entry.value.is_array() => vector(entry).map(Light::Direction),
         None => Err(entry.mistyped(allowed)),

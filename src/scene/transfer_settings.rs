@@ -31,7 +31,9 @@ pub struct TransferSettings {
 impl From<TransferFunction> for TransferSettings {
     /// Settings that state everything about one channel; further ones are ignored.
     fn from(transfer: TransferFunction) -> Self {
-        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, further: _ } = transfer;
+        // Whether values are labels is the volume's own.
+        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, membership: _, further: _ } =
+            transfer;
         let (color, opacity) = (Some(color), Some(opacity));
         Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
     }
@@ -72,13 +74,14 @@ impl TransferSettings {
         transfer.gradient_opacity = self.gradient_opacity.clone();
         transfer.iso_ranges = self.iso_ranges.clone();
         for (&label, own) in &self.labels {
-            let LabelTables { color, opacity, gradient_opacity, .. } =
+            let LabelTables { color, opacity, gradient_opacity, membership, .. } =
                 transfer.labels.remove(&label).unwrap_or_default();
             let tables = LabelTables {
                 visible: own.visible,
                 color: own.color.clone().or(color),
                 opacity: own.opacity.clone().or(opacity),
                 gradient_opacity: own.gradient_opacity.clone().or(gradient_opacity),
+                membership: own.membership || membership,
             };
             transfer.labels.insert(label, tables);
         }

@@ -7,15 +7,15 @@ use glam::DVec3;
 use toml::Value;
 
 use super::names::{
-    BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, PROFILES,
-    RASTERIZERS, name_of,
+    BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, LABEL_GRADIENTS, METHODS, ORDERS,
+    PROFILES, RASTERIZERS, name_of,
 };
 use super::{Channel, Fitting, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use crate::appearance::{Colormap, Preset};
 use crate::settings::camera::{Camera, Projection};
 use crate::settings::clip::Clip;
 use crate::settings::economies::Economies;
-use crate::settings::shading::{Light, Shading};
+use crate::settings::shading::{Gradient, Light, Shading};
 use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::Ramp;
 use crate::volume::{RawLayout, is_address};
@@ -219,6 +219,9 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
         text.line("label", i64::from(label));
         text.line("visible", tables.visible);
         text.ramps(tables.color.as_ref(), tables.opacity.as_ref(), tables.gradient_opacity.as_ref());
+        if tables.membership {
+            text.line("gradient", name_of(LABEL_GRADIENTS, true));
+        }
     }
 }
 
@@ -243,9 +246,13 @@ fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
     }
     match light {
         Light::Headlight => text.line("light", "headlight"),
+        Light::UpperLeft => text.line("light", "upper-left"),
         Light::Direction(direction) => text.line("light", vector(direction)),
     }
-    text.line("gradient", name_of(GRADIENTS, gradient));
+    // A scene that does not state it leaves it to the volume.
+    if gradient != Gradient::Auto {
+        text.line("gradient", name_of(GRADIENTS, gradient));
+    }
 }
 
 fn write_splatting(text: &mut Text, splatting: &Splatting, fitting: Fitting) {

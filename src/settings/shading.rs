@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-use crate::error::setting::{Interval, SettingError, check_direction};
+use super::camera::ViewBasis;
+use crate::error::setting::{Interval, SettingError, check_direction, scaled};
 
 /// Gradients shorter than this (value per world unit) have no direction (SPEC §3).
 pub const MIN_GRADIENT: f64 = 1e-12;
@@ -13,18 +14,37 @@ pub const MIN_GRADIENT: f64 = 1e-12;
 pub enum Light {
     /// From the eye.
     Headlight,
+    /// From the viewer's upper left: `normalize(-w - u/2 + v/2)` of the camera's axes.
+    UpperLeft,
     /// From a fixed world direction that points to the light, of any length except 0.
     Direction(DVec3),
 }
 
-/// The gradient from which [`Classification::After`](super::Classification::After) takes normals.
+impl Light {
+    /// The unit vector to the light, for a camera's axes; `None` for a headlight, which in perspective is another for every point.
+    pub(crate) fn direction(&self, basis: &ViewBasis) -> Option<DVec3> {
+        match *self {
+            Self::Headlight => None,
+            Self::UpperLeft => Some((-basis.w - basis.u / 2.0 + basis.v / 2.0).normalize()),
+            Self::Direction(direction) => Some(scaled(direction).normalize()),
+        }
+    }
+}
+
+/// The gradient from which normals are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Gradient {
+    /// [`Self::Membership`] for channels that are label maps and [classified before splatting](super::Classification::Before), for others
+    /// [`Self::Differences`].
+    Auto,
     /// The voxels' central differences, interpolated like the values.
     Differences,
-    /// The derivative of the reconstructed field, which is sharper but shows a scan's noise.
+    /// The derivative of the reconstructed field, which is sharper but shows a scan's noise. Classified before splatting, as [`Self::Differences`].
     Kernel,
+    /// That of the membership of a voxel's label, smoothed (SPEC §15), in channels that are label maps; as [`Self::Differences`] in others. Not for
+    /// [`Classification::After`](super::Classification::After).
+    Membership,
 }
 
 /// The cap of ambient, diffuse, specular and shininess, beyond which images no longer change. It avoids infinities in `f32`.
@@ -46,7 +66,7 @@ pub struct Shading {
     pub shininess: f64,
     /// The direction of the light.
     pub light: Light,
-    /// The gradient that is used; without effect for [`Classification::Before`](super::Classification::Before).
+    /// The gradient that is used.
     pub gradient: Gradient,
 }
 
@@ -59,7 +79,7 @@ impl Default for Shading {
             specular: 0.2,
             shininess: 20.0,
             light: Light::Headlight,
-            gradient: Gradient::Differences,
+            gradient: Gradient::Auto,
         }
     }
 }
@@ -76,7 +96,7 @@ impl Shading {
         Interval::NOT_NEGATIVE.check("shading.specular", specular)?;
         Interval::POSITIVE.check("shading.shininess", shininess)?;
         match light {
-            Light::Headlight => Ok(()),
+            Light::Headlight | Light::UpperLeft => Ok(()),
             Light::Direction(direction) => check_direction("shading.light", direction),
         }
     }

@@ -3,9 +3,10 @@
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul};
 
-use glam::DVec3;
+use glam::{DVec3, UVec3};
 
 use crate::error::setting::{Interval, SettingError};
+use crate::volume::{Members, Volume};
 
 /// Why control points are not a valid [`Ramp`].
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -99,6 +100,9 @@ pub struct TransferFunction {
     pub gradient_opacity: Option<Ramp<f64>>,
     /// Closed intervals `[lo, hi]` of the values that take part, at least one; `None` means all values.
     pub iso_ranges: Option<Vec<[f64; 2]>>,
+    /// Whether values are labels, and gradients those of the membership of a voxel's value (SPEC §15). Without effect for
+    /// [`Classification::After`](super::Classification::After).
+    pub membership: bool,
     /// Tables for single labels of a segmented volume. Labels without tables use the ramps above. Other volumes ignore them.
     pub labels: BTreeMap<u16, LabelTables>,
     /// The transfer functions of the volume's further channels ([`Volume::further`](crate::Volume::further)), in their order. These have no
@@ -117,11 +121,14 @@ pub struct LabelTables {
     pub opacity: Option<Ramp<f64>>,
     /// Replaces [`TransferFunction::gradient_opacity`]; `None` uses it.
     pub gradient_opacity: Option<Ramp<f64>>,
+    /// Whether normals are those of the label's membership in the segmentation (SPEC §15), and not the values'. Not for
+    /// [`Classification::After`](super::Classification::After).
+    pub membership: bool,
 }
 
 impl Default for LabelTables {
     fn default() -> Self {
-        Self { visible: true, color: None, opacity: None, gradient_opacity: None }
+        Self { visible: true, color: None, opacity: None, gradient_opacity: None, membership: false }
     }
 }
 
@@ -141,7 +148,8 @@ impl LabelTables {
 
     /// Whether they differ from those of labels without any. Classified after splatting (SPEC §9), invisible labels must be known, too.
     pub fn matter(&self) -> bool {
-        !self.visible || self.color.is_some() || self.opacity.is_some() || self.gradient_opacity.is_some()
+        let is_other = self.color.is_some() || self.opacity.is_some() || self.gradient_opacity.is_some();
+        !self.visible || is_other || self.membership
     }
 }
 
@@ -158,6 +166,8 @@ pub struct Tables<'a> {
     pub gradient_opacity: Option<&'a Ramp<f64>>,
     /// The iso-ranges of [`TransferFunction::iso_ranges`], the same for all labels.
     pub iso_ranges: Option<&'a [[f64; 2]]>,
+    /// The labels whose membership has the normals (SPEC §15); those that are the values have the gradients of opacities, too.
+    pub members: Option<Members>,
 }
 
 impl Tables<'_> {
@@ -168,6 +178,14 @@ impl Tables<'_> {
         }
         let factor = self.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient_magnitude));
         self.opacity.at(value) * factor
+    }
+
+    /// The gradient of a voxel that opacities depend on.
+    pub(crate) fn gradient(&self, volume: &Volume, voxel: UVec3) -> DVec3 {
+        match self.members {
+            Some(of @ Members::OfValues) => volume.membership_gradient(of, voxel),
+            Some(Members::OfLabels) | None => volume.gradient(voxel),
+        }
     }
 
     /// The end of an iso-range that a value is, but for the rounding of a place between two values found by it; otherwise the value. An iso-range
@@ -316,7 +334,7 @@ impl TransferFunction {
     /// A transfer function with only colour and opacity.
     pub(crate) fn by_value(color: Ramp<DVec3>, opacity: Ramp<f64>) -> Self {
         let (labels, further) = (BTreeMap::new(), Vec::new());
-        Self { color, opacity, gradient_opacity: None, iso_ranges: None, labels, further }
+        Self { color, opacity, gradient_opacity: None, iso_ranges: None, membership: false, labels, further }
     }
 
     /// A transfer function without any opacity.
@@ -329,6 +347,11 @@ impl TransferFunction {
         std::iter::once(self).chain(&self.further)
     }
 
+    /// Whether any channel's voxels have normals of the membership of their labels.
+    pub(crate) fn has_membership(&self) -> bool {
+        self.channels().any(|channel| channel.membership || channel.labels.values().any(|tables| tables.membership))
+    }
+
     /// The transfer function of one channel by itself.
     pub(crate) fn of_channel(&self, number: usize) -> Self {
         let own = number.checked_sub(1).map_or(self, |at| &self.further[at]);
@@ -338,12 +361,14 @@ impl TransferFunction {
     /// The tables that apply to voxels of a label; `None` means those of a volume that is not segmented.
     pub fn tables(&self, label: Option<u16>) -> Tables<'_> {
         let own = label.and_then(|label| self.labels.get(&label));
+        let of_label = own.filter(|own| own.membership).map(|_| Members::OfLabels);
         Tables {
             visible: own.is_none_or(|own| own.visible),
             color: own.and_then(|own| own.color.as_ref()).unwrap_or(&self.color),
             opacity: own.and_then(|own| own.opacity.as_ref()).unwrap_or(&self.opacity),
             gradient_opacity: own.and_then(|own| own.gradient_opacity.as_ref()).or(self.gradient_opacity.as_ref()),
             iso_ranges: self.iso_ranges.as_deref(),
+            members: of_label.or(self.membership.then_some(Members::OfValues)),
         }
     }
 

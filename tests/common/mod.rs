@@ -6,6 +6,7 @@ pub(crate) mod compare;
 #[cfg(feature = "gpu")]
 pub(crate) mod devices;
 pub(crate) mod images;
+pub(crate) mod label_maps;
 pub(crate) mod pool;
 pub(crate) mod random_scene;
 pub(crate) mod shared;

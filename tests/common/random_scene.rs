@@ -224,7 +224,11 @@ fn scene(style: u64, random: &mut Random, volume: &Volume, mut splatting: Splatt
         diffuse: random.uniform(0.0, 1.5),
         specular: random.uniform(0.0, 1.5),
         shininess: logarithmic(random, 0.1, 300.0),
-        light: random.pick(&[Light::Headlight, Light::Headlight, Light::Direction(direction)]),
+        light: match random.pick(&[Light::Headlight, Light::Headlight, Light::Direction(direction)]) {
+            // By a generator of its own, so that older cases stay.
+            Light::Headlight => Random(random.0 ^ 0x6c69_6768_7421).pick(&[Light::Headlight, Light::UpperLeft]),
+            light => light,
+        },
         ..Shading::default()
     };
     let clip = if splatting.method == every { Clip::default() } else { clip(random, grid) };

@@ -61,6 +61,7 @@ fn alpha() {
         opacity: Ramp::new(vec![(0.0, 0.0), (10.0, 1.0)]).unwrap(),
         gradient_opacity: None,
         iso_ranges: None,
+        membership: false,
         labels: BTreeMap::new(),
         further: Vec::new(),
     };

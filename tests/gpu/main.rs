@@ -19,6 +19,7 @@ mod holes;
 mod labels;
 mod limits;
 mod lists;
+mod membership;
 mod memory;
 mod minified;
 mod modes;

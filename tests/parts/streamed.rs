@@ -9,14 +9,16 @@ use sheetsplat::Image;
 use sheetsplat::headless::{Backend, Headless, HeadlessView};
 use sheetsplat::part::Part;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Region, Window};
+use sheetsplat::settings::{Compositing, Gradient, Region, Window};
 use sheetsplat::stats::StoreCounts;
 use sheetsplat::volume::{
     IndexedStore, Labels, SampleType, Store, StoreIndex, StreamedLevel, StreamedVolume, Volume, builtin,
 };
 
+use crate::common::Random;
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
+use crate::common::label_maps::{labels, scene_of_labels};
 use crate::common::store::{self, MemoryStore};
 use crate::merging::headless;
 
@@ -111,6 +113,29 @@ fn boxes_by_the_gpu_are_the_volume_in_memory() {
         assert_same(Backend::Gpu, 64, sets);
     }
     assert_same(Backend::Gpu, 64, &["splatting.rasterizer=quads", "splatting.classification=after"]);
+}
+
+/// Normals of labels depend on voxels four from their own, and a box may hold too few labels to look like a label map.
+#[test]
+fn boxes_of_label_maps_are_the_volume_in_memory() {
+    let mut random = Random(53);
+    let dims = UVec3::new(40, 44, 38);
+    let labels = labels(&mut random, dims).into_iter().map(f32::from).collect();
+    let volume = Volume::new("labels", dims, DVec3::new(1.0, 1.0, 1.3), labels).unwrap().as_label_map();
+    for (backend, compositing) in [(Backend::Reference, Compositing::Linear), (Backend::Gpu, Compositing::Exponential)]
+    {
+        let mut scene = scene_of_labels(&mut random);
+        scene.shading.gradient = Gradient::Auto;
+        scene.splatting.compositing = compositing;
+        scene.splatting.opacity_threshold = 1.0;
+        let headless = headless(backend);
+        let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
+        let store = MemoryStore::new(&volume, UVec3::new(8, 12, 10));
+        let drawn = headless.render_volume(streamed(&volume, store, 1 << 18), &scene).unwrap();
+        let background = scene.image.background.map(|channel| channel as f32);
+        assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, background, 500), 100.0, format!("{backend}"));
+        assert!(drawn.stats.store.unwrap().chunk_bytes < 1 << 18);
+    }
 }
 
 /// A GPU keeps the pages that further windows need. Where it has room for all, each chunk is read once, and of others the voxels beside drawn ones.

@@ -9,7 +9,9 @@ use glam::{DVec3, UVec3};
 use super::access::{Access, ReadOptions};
 use super::error::volume::refused;
 use super::format;
+use super::label_facts::LabelFacts;
 use super::loaded::Loaded;
+use super::membership::{KeptMembership, Members};
 use super::resample::labels_onto;
 use super::voxel::Voxel;
 use super::{Grid, Orientation, Volume, VolumeError};
@@ -165,6 +167,7 @@ impl Volume {
             ));
         }
         self.labels = Some(values);
+        self.membership[Members::OfLabels as usize] = KeptMembership::default();
         self.label_names = names;
         Ok(self)
     }
@@ -177,6 +180,18 @@ impl Volume {
     /// The names of labels, where known: of a segmented volume, or of one whose values are labels.
     pub fn label_names(&self) -> &BTreeMap<u16, String> {
         &self.label_names
+    }
+
+    /// The same volume with values that are known to be labels.
+    #[doc(hidden)]
+    pub fn as_label_map(self) -> Self {
+        Self { is_label_map: true, ..self }
+    }
+
+    /// What has been found out about its values as labels.
+    #[doc(hidden)]
+    pub fn label_facts(&self) -> &LabelFacts {
+        &self.label_facts
     }
 
     /// Whether the values are known to be labels, whatever they look like: they were resampled as labels, or their file names them.

@@ -36,9 +36,11 @@ mod head;
 mod identity;
 mod index;
 mod inputs;
+mod label_facts;
 mod labels;
 mod loaded;
 mod located;
+mod membership;
 mod memory;
 #[cfg(feature = "metaimage")]
 mod metaimage;
@@ -104,6 +106,7 @@ pub use grid::Grid;
 pub use index::{IndexedStore, StoreIndex};
 pub use inputs::Inputs;
 pub use labels::Labels;
+pub use membership::Members;
 pub use open::open_store;
 pub use orientation::{Orientation, PatientSide};
 pub use outputs::Outputs;
@@ -134,6 +137,7 @@ pub mod internals {
         pub use crate::identity::{folder, resolved};
     }
     pub use crate::labels::labels_of;
+    pub use crate::membership::MEMBERSHIP_REACH;
     #[cfg(feature = "npy")]
     pub use crate::npy;
     #[cfg(feature = "npy")]

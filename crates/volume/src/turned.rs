@@ -75,7 +75,8 @@ impl Volume {
         self.labels.as_mut().into_iter().for_each(|labels| turn(Arc::make_mut(labels), width));
         let further = self.further.into_iter();
         let further = further.map(|channel| Arc::new(Arc::unwrap_or_clone(channel).with_turned(turned))).collect();
-        Self { grid: self.grid.turned(), further, coefficients: KeptCoefficients::default(), ..self }
+        let (coefficients, membership) = (KeptCoefficients::default(), Default::default());
+        Self { grid: self.grid.turned(), further, coefficients, membership, ..self }
     }
 
     /// How the file's own axes lie in a patient, if known: as [`Self::orientation`], unless the first axis is turned.

@@ -11,6 +11,8 @@ use super::display::ChannelDisplay;
 use super::encoding::Encoding;
 use super::error::volume::{VolumeError, refused};
 use super::grid::{Grid, check_spacing};
+use super::label_facts::LabelFacts;
+use super::membership::KeptMembership;
 use super::orientation::{MAX_COSINE, Orientation};
 use super::sample_type::Sample;
 use super::store::StoreFacts;
@@ -55,6 +57,9 @@ pub struct Volume {
     pub(super) sampled: Option<Grid>,
     /// Not part of the volume itself; clones share them, since their values are the same.
     pub(super) coefficients: KeptCoefficients,
+    pub(super) label_facts: LabelFacts,
+    /// Those of its values and of its labels, kept as the coefficients are.
+    pub(super) membership: [KeptMembership; 2],
 }
 
 impl PartialEq for Volume {
@@ -173,6 +178,8 @@ impl Volume {
             reads: None,
             sampled: None,
             coefficients: KeptCoefficients::default(),
+            label_facts: LabelFacts::default(),
+            membership: Default::default(),
         }
     }
 

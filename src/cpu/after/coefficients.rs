@@ -131,7 +131,7 @@ impl Coefficients {
         if !is_first && is_narrow && self.exact.is_none() && self.wide.is_none() && values.len() as u64 <= MAX_VOXELS {
             self.wide = Some(values.iter().collect());
         }
-        let is_kept = scene.shading.gradient == Gradient::Differences && Field::is_narrow(scene.splatting.radius);
+        let is_kept = scene.shading.gradient != Gradient::Kernel && Field::is_narrow(scene.splatting.radius);
         if !(scene.shading.enabled && is_kept) {
             return;
         }

@@ -137,7 +137,7 @@ impl<'a> Frame<'a> {
             transfer,
             numbers,
             integrals: Integrals::new(labelled.is_some(), transfer, splatting, &matter.all_numbers()),
-            shader: Shader::new(shading, splatting.compositing),
+            shader: Shader::new(shading, &scene.camera.basis(), splatting.compositing),
             compositor: Compositor {
                 compositing: splatting.compositing,
                 order: Order::FrontToBack,

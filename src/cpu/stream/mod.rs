@@ -136,8 +136,13 @@ impl Stream {
         }
     }
 
-    /// The material of a chunk's voxel. Its gradient may need values of other chunks, which are read for it.
+    /// The material of a chunk's voxel. Its gradient may need values of other chunks, which are read for it; with a label map they have been read with the
+    /// chunk.
     pub(super) fn material(self: &Arc<Self>, chunk: &Chunk, voxel: UVec3) -> Material {
+        let of_labels = self.source.splats.as_ref().filter(|splats| splats.transfer.membership);
+        if let (Some(splats), Some((low, volume))) = (of_labels, chunk.values()) {
+            return Material::of(volume, &splats.transfer, voxel - low);
+        }
         let value = |voxel| {
             let outside = || self.chunk(self.source.number_of(voxel))?.value(voxel);
             chunk.value(voxel).or_else(outside).unwrap_or_else(|| self.source.store.fill())

@@ -13,7 +13,7 @@ use crate::lists::iso_range::ValueSet;
 use crate::settings::clip::ClippedVoxels;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::range::{EMPTY, finite_range, union};
-use crate::volume::{Grid, Store, StoreLevel, Volume, VolumeError};
+use crate::volume::{Grid, MEMBERSHIP_REACH, Store, StoreLevel, Volume, VolumeError};
 
 /// The minimum number of voxels along each axis of a chunk that is drawn. Smaller chunks of the store are read together.
 const LEAST_SIDE: u32 = 16;
@@ -78,7 +78,8 @@ impl Source {
         if chunk.min_element() > 0 {
             let side = Self::side(*chunk, grid);
             // With the voxels around a chunk.
-            if count(StoreLevel { grid: *grid, chunk: side }.chunks()) <= MOST_CHUNKS && count(side + 2) <= MOST_VOXELS
+            let with_rim = side + 2 * MEMBERSHIP_REACH;
+            if count(StoreLevel { grid: *grid, chunk: side }.chunks()) <= MOST_CHUNKS && count(with_rim) <= MOST_VOXELS
             {
                 return Ok(());
             }
@@ -124,11 +125,13 @@ impl Source {
         self.known_range(number).is_some_and(|[min, max]| min > max || !shown.meets(min, max))
     }
 
-    /// The box that a chunk is read with: its voxels, and with gradient opacity, which needs gradients to decide what takes part, those around them.
+    /// The box that a chunk is read with: its voxels, and those around them on which depends what takes part, with gradient opacity, or a label map's normals.
     pub(super) fn read_bounds(&self, number: u32) -> (UVec3, UVec3) {
         let (from, dims) = self.bounds(number);
-        let needs_gradients = |splats: &Splats| splats.transfer.gradient_opacity.is_some();
-        let rim = u32::from(self.splats.as_ref().is_some_and(needs_gradients));
+        let rim = self.splats.as_ref().map_or(0, |Splats { transfer, .. }| match transfer.membership {
+            true => MEMBERSHIP_REACH,
+            false => u32::from(transfer.gradient_opacity.is_some()),
+        });
         let low = from.saturating_sub(UVec3::splat(rim));
         (low, (from + dims + rim).min(self.grid.dims) - low)
     }

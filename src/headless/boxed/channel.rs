@@ -53,6 +53,8 @@ pub(super) struct ChannelChunks<'a> {
     labels: Option<LevelChunks<'a>>,
     /// The values that have an opacity, under the tables of any label.
     opaque: ValueSet,
+    /// Whether its values are labels, with normals of their membership.
+    is_label_map: bool,
     /// Whether points between voxels have values between theirs.
     is_between: bool,
     /// Whether values count that have no opacity ([`counts_all`]).
@@ -78,7 +80,8 @@ impl<'a> ChannelChunks<'a> {
         let opaque = opaque_values(transfer);
         let is_told_by_chunks = reach.cmple(values.level.chunk).all();
         let is_between = splatting.classification == Classification::After;
-        Ok(Self { number, values, labels, opaque, is_between, counts_all: counts_all(splatting), is_told_by_chunks })
+        let (is_label_map, counts_all) = (transfer.membership, counts_all(splatting));
+        Ok(Self { number, values, labels, opaque, is_label_map, is_between, counts_all, is_told_by_chunks })
     }
 
     /// Whether any value has an opacity.
@@ -143,6 +146,7 @@ impl<'a> ChannelChunks<'a> {
         grid: &Grid,
     ) -> Result<Volume, RenderError> {
         let volume = Volume::punched(*grid, values);
+        let volume = if self.is_label_map { volume.as_label_map() } else { volume };
         let volume = if self.values.of.store.has_colors() { volume.with_texels(colors) } else { volume };
         let Some(labels) = &self.labels else { return Ok(volume) };
         let origin = labels.of.origin.clone();

@@ -15,8 +15,7 @@ use crate::settings::splatting::Classification;
 use crate::settings::window::Region;
 use crate::stats::StoreCounts;
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-use crate::volume::Grid;
-use crate::volume::{StreamedVolume, Volume};
+use crate::volume::{Grid, MEMBERSHIP_REACH, StreamedVolume, Volume};
 
 /// The part of the memory that the values of a box may take, as backends hold them several times, and that decoded chunks may take.
 const SHARE: u64 = 4;
@@ -27,8 +26,8 @@ const STEP_SHARE: u64 = 8;
 /// Slabs around those of a window, which share planes with them.
 pub(super) const SLABS: f64 = 2.0;
 
-/// Voxels around those whose kernels reach a window: for differences between neighbours, and rounding.
-const RIM: f64 = 3.0;
+/// Voxels around those whose kernels reach a window for rounding; those for gradients come beside them.
+const RIM: f64 = 2.0;
 
 /// Pixels around those of a window.
 pub(super) const PIXELS: f64 = 1.0;
@@ -39,6 +38,8 @@ pub(super) struct Chunks<'a> {
     view: ViewGeometry,
     /// Voxels around a point on a pixel's ray whose kernels reach it.
     half_box: DVec3,
+    /// Voxels around these: for their gradients, and rounding.
+    rim: f64,
     /// The channels that have an opacity.
     channels: Vec<ChannelChunks<'a>>,
     most_held: u64,
@@ -68,7 +69,9 @@ impl<'a> Chunks<'a> {
         });
         let channels = channels.collect::<Result<Vec<_>, _>>()?;
         let channels = channels.into_iter().filter(ChannelChunks::has_opacity).collect();
-        Ok(Self { volume, view: *view, half_box: geometry.widest_half_box(view), channels, most_held: 0 })
+        let of_gradients = if transfer.has_membership() { MEMBERSHIP_REACH } else { 1 };
+        let (half_box, rim) = (geometry.widest_half_box(view), RIM + f64::from(of_gradients));
+        Ok(Self { volume, view: *view, half_box, rim, channels, most_held: 0 })
     }
 
     /// The first step in which slabs behind a region are drawn front to back: as many as fit into memory with the voxels that they need; `None` if those of
@@ -114,8 +117,8 @@ impl<'a> Chunks<'a> {
             }
         }
         let dims = self.volume.grid().dims.as_dvec3();
-        let low = (low - self.half_box - RIM).floor().max(DVec3::ZERO);
-        let end = (high + self.half_box + RIM).ceil().min(dims);
+        let low = (low - self.half_box - self.rim).floor().max(DVec3::ZERO);
+        let end = (high + self.half_box + self.rim).ceil().min(dims);
         low.cmplt(end).all().then(|| VoxelBox { low: low.as_uvec3(), end: end.as_uvec3() })
     }
 

@@ -231,7 +231,8 @@ impl PagePool {
         };
         let all: Vec<u32> =
             slots.iter().copied().chain(own(|channel| channel.labels)).chain(own(|channel| channel.colors)).collect();
-        let upload = || VolumeTexture::upload_slots(&self.device, &self.queue, &all);
+        let upload =
+            || VolumeTexture::upload_words(&self.device, &self.queue, ("sheetsplat.pages", "the slots of pages"), &all);
         Ok(Paged {
             slots: scoped(&self.device, upload)??,
             bits: self.bits,

@@ -92,7 +92,7 @@ type Read = (Block, Vec<ReadPage>);
 type Ahead = (i32, [u32; 3], usize);
 
 impl<'a> Pages<'a> {
-    /// What a scene, with everything stated, needs of a volume; `None` if no channel has an opacity.
+    /// What a scene, with everything stated, needs of a volume; `None` if no channel has an opacity, or one has normals of the membership of labels.
     ///
     /// # Errors
     /// If the chunks are too many, or the device has no room for pages.
@@ -102,6 +102,11 @@ impl<'a> Pages<'a> {
         scene: &Scene,
         view: &ViewGeometry,
     ) -> Result<Option<Self>, RenderError> {
+        let transfer = scene.resolve(&volume.sample);
+        // The gradients of membership lie in no pages.
+        if transfer.has_membership() {
+            return Ok(None);
+        }
         let chunks = Chunks::new(volume, scene, view)?;
         let drawn: Vec<usize> = chunks.channels().map(|channel| channel.number).collect();
         let Some(first) = chunks.channels().next() else { return Ok(None) };
@@ -117,7 +122,7 @@ impl<'a> Pages<'a> {
         };
         let rim = match &needs {
             Some(needs) => needs.reach.along,
-            None => UVec3::splat(u32::from(scene.resolve(&volume.sample).channels().any(is_by_gradient))),
+            None => UVec3::splat(u32::from(transfer.channels().any(is_by_gradient))),
         };
         let hollow = chunks.channels().map(|channel| HollowChannel {
             labels: channel.levels().count() > 1,

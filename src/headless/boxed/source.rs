@@ -13,10 +13,11 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::headless::Headless;
 use crate::part::Content;
 use crate::scene::Scene;
+use crate::settings::Gradient;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
-use crate::volume::StreamedVolume;
 use crate::volume::range::range_of;
+use crate::volume::{StreamedVolume, Volume};
 
 /// The side in pixels of the regions that an image is divided into where windows are drawn from boxes. A region whose voxels do not fit into memory is divided
 /// further.
@@ -146,7 +147,12 @@ impl<'a> Source<'a> {
                 let Some((volume, channels)) = chunks.read(within)? else { return Ok(None) };
                 let range = range_of(volume.values().iter());
                 // A channel of which nothing is seen changes nothing, so that its table is left out.
-                let (content, stats) = headless.draw_box(volume, &scene.of_channels(&channels), window, closed)?;
+                let mut scene = scene.of_channels(&channels);
+                let has_labels = volume.channels().any(Volume::is_known_label_map);
+                if scene.shading.gradient == Gradient::Membership && !has_labels {
+                    scene.shading.gradient = Gradient::Differences;
+                }
+                let (content, stats) = headless.draw_box(volume, &scene, window, closed)?;
                 Ok(Some((content, stats, range)))
             }
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]

@@ -79,14 +79,6 @@ impl<'a> Field<'a> {
         let grid = self.volume.grid();
         let mut weights = 0.0;
         match self.gradient {
-            Gradient::Differences => {
-                let mut sum = DVec3::ZERO;
-                self.each(at, low_pass, |index, weight, _| {
-                    sum += self.volume.gradient(grid.voxel_at(index)) * weight;
-                    weights += weight;
-                });
-                sum / weights
-            }
             Gradient::Kernel => {
                 let (mut sum, mut offsets, mut moment) = (0.0, DVec3::ZERO, DVec3::ZERO);
                 // Differences from one coefficient, so that the gradient of a constant is exactly 0: its direction would be rounding errors.
@@ -100,6 +92,14 @@ impl<'a> Field<'a> {
                     weights += weight;
                 });
                 -2.0 * self.falloff * (moment - sum / weights * offsets) / weights / grid.spacing
+            }
+            _ => {
+                let mut sum = DVec3::ZERO;
+                self.each(at, low_pass, |index, weight, _| {
+                    sum += self.volume.gradient(grid.voxel_at(index)) * weight;
+                    weights += weight;
+                });
+                sum / weights
             }
         }
     }

@@ -246,7 +246,7 @@ impl<'a> Pixel<'a> {
             if let Some([near, far]) = gradients {
                 let gradient = near.lerp(far, ends[0] + (ends[1] - ends[0]) * means.share);
                 amount *= tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient.length()));
-                color = shading::color(&scene.shading, color, gradient, self.to_eye());
+                color = shading::color(scene, color, gradient, self.to_eye());
             }
             let length = (part.end - part.start) * self.length_per_sheet;
             (part, color.extend(1.0) * amount * length)

@@ -110,6 +110,7 @@ fn every_key() {
         color = [[3, [1, 1, 1]]]
         opacity = [[0, 0], [9, 1]]
         gradient_opacity = [[2, 0.25]]
+        gradient = "membership"
         [[transfer.label]]
         label = 0
         visible = false
@@ -180,6 +181,7 @@ fn every_key() {
                         color: Some(Ramp::new(vec![(3.0, DVec3::ONE)]).unwrap()),
                         opacity: Some(Ramp::new(vec![(0.0, 0.0), (9.0, 1.0)]).unwrap()),
                         gradient_opacity: Some(Ramp::new(vec![(2.0, 0.25)]).unwrap()),
+                        membership: true,
                     },
                 ),
             ]
@@ -230,7 +232,11 @@ fn every_key() {
     assert_eq!(after.splatting.classification, Classification::After);
     let scene = parse(text, &["splatting.method=composite-every-sample"]).unwrap();
     assert_eq!(scene.splatting.method, Method::CompositeEverySample);
-    assert_eq!(parse(MINIMAL, &["shading.light=headlight"]).unwrap().shading.light, Light::Headlight);
+    for (name, light) in [("headlight", Light::Headlight), ("upper-left", Light::UpperLeft)] {
+        let scene = parse(MINIMAL, &[&format!("shading.light={name}")]).unwrap();
+        assert_eq!(scene.shading.light, light);
+        assert!(scene.to_toml(std::path::Path::new("")).unwrap().contains(&format!("light = \"{name}\"")));
+    }
 }
 
 #[test]

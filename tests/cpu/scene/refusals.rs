@@ -152,8 +152,8 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     // The volume has no labels.
     ("transfer.label", "[{label = 1}]", "transfer.label", "tables for a volume without labels", "volume.labels"),
     ("shading.enabled", "1", "shading.enabled", "1 (integer)", "true or false"),
-    ("shading.light", "'sun'", "shading.light", "\"sun\"", "\"headlight\" or [x, y, z]"),
-    ("shading.light", "3", "shading.light", "3 (integer)", "\"headlight\" or [x, y, z]"),
+    ("shading.light", "'sun'", "shading.light", "\"sun\"", "\"headlight\", \"upper-left\" or [x, y, z]"),
+    ("shading.light", "3", "shading.light", "3 (integer)", "\"headlight\", \"upper-left\" or [x, y, z]"),
     ("shading.light", "[0, 0, 0]", "shading.light", "[0, 0, 0]", "a vector other than [0, 0, 0]"),
     ("shading.light", "[0, 1]", "shading.light", "[0, 1]", "3 numbers"),
     ("shading.ambient", "-0.1", "shading.ambient", "-0.1", "a finite number >= 0"),

@@ -38,6 +38,7 @@ fn random_transfer(random: &mut Random, [min, max]: [f64; 2]) -> TransferFunctio
         opacity: Ramp::new(opacity).unwrap(),
         gradient_opacity: None,
         iso_ranges: random.pick(&[false, true]).then_some(ranges),
+        membership: false,
         labels: BTreeMap::new(),
         further: Vec::new(),
     }
@@ -97,6 +98,7 @@ fn narrow_peaks_beside_plateaus() {
         opacity,
         gradient_opacity: None,
         iso_ranges: None,
+        membership: false,
         labels: BTreeMap::new(),
         further: Vec::new(),
     };

@@ -55,6 +55,7 @@ fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
         opacity,
         gradient_opacity: None,
         iso_ranges: None,
+        membership: false,
         labels: BTreeMap::new(),
         further: Vec::new(),
     });

@@ -66,10 +66,12 @@ pub(super) fn shading(ui: &mut Ui, shading: &mut Shading, classification: Classi
     if !shading.enabled {
         return;
     }
-    let mut is_headlight = shading.light == Light::Headlight;
-    if ui.checkbox(&mut is_headlight, "headlight").changed() {
-        shading.light = if is_headlight { Light::Headlight } else { Light::Direction(direction([-135.0, 45.0])) };
-    }
+    let fixed = match shading.light {
+        light @ Light::Direction(_) => light,
+        _ => Light::Direction(direction([-135.0, 45.0])),
+    };
+    let lights = [(Light::Headlight, "headlight"), (Light::UpperLeft, "upper left"), (fixed, "fixed")];
+    choice(ui, "light", &mut shading.light, &lights);
     if let Light::Direction(to_light) = &mut shading.light {
         let [mut azimuth, mut elevation] = angles(*to_light);
         let across = ui.add(Slider::new(&mut azimuth, -180.0..=180.0).suffix("°").text("light azimuth"));
@@ -79,10 +81,12 @@ pub(super) fn shading(ui: &mut Ui, shading: &mut Shading, classification: Classi
             *to_light = direction([azimuth, elevation]);
         }
     }
-    if classification == Classification::After {
-        let gradients = [(Gradient::Differences, "differences"), (Gradient::Kernel, "kernel")];
-        choice(ui, "gradient", &mut shading.gradient, &gradients);
-    }
+    let other = match classification {
+        Classification::After => (Gradient::Kernel, "kernel"),
+        _ => (Gradient::Membership, "membership"),
+    };
+    let gradients = [(Gradient::Auto, "automatic"), (Gradient::Differences, "differences"), other];
+    choice(ui, "gradient", &mut shading.gradient, &gradients);
     slider(ui, &mut shading.ambient, 0.0..=1.0, "ambient");
     slider(ui, &mut shading.diffuse, 0.0..=1.0, "diffuse");
     slider(ui, &mut shading.specular, 0.0..=1.0, "specular");

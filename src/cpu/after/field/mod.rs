@@ -122,7 +122,7 @@ impl<'a> Field<'a> {
     /// `has_gradient` those that its gradient needs.
     pub(super) fn reach(&self, half_box: DVec3, has_gradient: bool) -> DVec3 {
         let of_value = half_box.ceil().max(DVec3::splat(cube::SIDE as f64 / 2.0));
-        let is_difference = has_gradient && self.gradient == Gradient::Differences;
+        let is_difference = has_gradient && self.gradient != Gradient::Kernel;
         if is_difference { of_value + 1.0 } else { of_value }
     }
 
@@ -205,8 +205,8 @@ impl<'a> Field<'a> {
             || self.find_weights(simd, of, [column, row], lanes, weights).is_some()
         {
             gradients = match self.gradient {
-                Gradient::Differences => self.cubes_differences(simd, weights, lanes),
                 Gradient::Kernel => self.cubes_moments(simd, weights, lanes),
+                _ => self.cubes_differences(simd, weights, lanes),
             };
             // Where the sum is not finite a hole is near.
             let [x, y, z] = gradients.each_ref().map(|component| f32x8::load_array_ref(simd, component));
@@ -217,8 +217,8 @@ impl<'a> Field<'a> {
             let lane = lane as usize;
             let (at, low_pass) = (of.0.of(column + lane, row), &of.1);
             let gradient = match self.gradient {
-                Gradient::Differences => self.row_differences(simd, at, low_pass),
                 Gradient::Kernel => self.kernel_gradient(self.row_moments(simd, at, low_pass)),
+                _ => self.row_differences(simd, at, low_pass),
             };
             (0..3).for_each(|axis| gradients[axis][lane] = gradient[axis]);
         }

@@ -80,6 +80,7 @@ fn any_list(prepared: &Prepared<'_>) -> CullList {
         channels: 1,
         colors: None,
         labels: None,
+        membership: None,
         control_points: &storage,
         occluded: &storage,
         culled: &storage,

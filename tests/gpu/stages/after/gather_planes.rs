@@ -122,6 +122,7 @@ fn gathered(prepared: &Prepared<'_>, stage: &Gather, first_hit: Option<f64>, ban
         pages: None,
         colors: None,
         labels: labels.as_ref().map(|texture| &texture.view),
+        membership: None,
         gathered: &gathered,
         half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),
         cut: CutBuffers { uniform: &init(device, &[cut], BufferUsages::UNIFORM), surfaces: &no_surfaces(device) },

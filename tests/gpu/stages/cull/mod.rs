@@ -117,6 +117,7 @@ impl<'a> Culling<'a> {
             channels: 1,
             colors: None,
             labels: labels.as_ref().map(|labels| &labels.view),
+            membership: None,
             control_points: &init(device, &ramps.points, BufferUsages::STORAGE),
             occluded: &targets.occluded,
             culled: &culled,
@@ -218,6 +219,7 @@ impl Case {
             opacity: Ramp::new(vec![(0.0, 0.5)]).unwrap(),
             gradient_opacity: None,
             iso_ranges: None,
+            membership: false,
             labels: BTreeMap::new(),
             further: Vec::new(),
         }

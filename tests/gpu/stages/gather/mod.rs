@@ -131,6 +131,7 @@ impl<'a> Fixture<'a> {
             pages: None,
             colors: None,
             labels: None,
+            membership: None,
             gathered: &gathered,
             half_boxes: &init(device, &half_boxes, BufferUsages::STORAGE),
             cut: CutBuffers { uniform: &init(device, &[cut], BufferUsages::UNIFORM), ..uncut.buffers() },

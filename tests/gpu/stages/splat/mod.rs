@@ -55,6 +55,7 @@ impl<'a> Stages<'a> {
             channels: 1,
             colors: None,
             labels: None,
+            membership: None,
             control_points: &storage,
             occluded: &storage,
             culled: &storage,
