@@ -1,5 +1,5 @@
 // Gradients of voxels: of values, or of the membership of labels (SPEC §15), which `gpu::membership` uploads by blocks of 8×8×8 voxels.
-// The stage declares `values` and `membership`.
+// The stage declares `membership`.
 //
 // #import shared/frame
 // #import shared/texels

@@ -94,7 +94,7 @@ fn words(volume: &Volume, shaded: &[Shaded]) -> Vec<u32> {
 fn record(channel: &Volume, shaded: &Shaded, block: UVec3) -> Option<Vec<u32>> {
     let (of, labels) = match shaded {
         Shaded::Labels(labels) => (Members::OfLabels, Some(labels)),
-        Shaded::LabelMap if channel.has_membership(block) => (Members::OfValues, None),
+        Shaded::LabelMap if channel.has_membership(SIDE * block) => (Members::OfValues, None),
         Shaded::LabelMap | Shaded::Nothing => return None,
     };
     let (grid, per_unit) = (channel.grid(), channel.grid().unit() / 2.0);

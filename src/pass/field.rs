@@ -54,7 +54,7 @@ impl Field {
 
     /// Compiles the pipeline for a gradient.
     pub fn prepare(&self, device: &Device, gradient: Gradient) {
-        self.field[gradient as usize].get_or_init(|| {
+        self.field[place_of(gradient)].get_or_init(|| {
             let sheets = sheets_of_a_group(self.format, SHEETS_PER_PLANE, Some(added_to(wgpu::BlendFactor::One)));
             let constants = [("KERNEL_GRADIENT", f64::from(u8::from(gradient == Gradient::Kernel)))];
             let entries = (shaders::FIELD, ["vertex", "fragment"]);
@@ -91,8 +91,13 @@ impl Field {
         (clear_group, tiles): (&BindGroup, &Buffer),
         lists: impl IntoIterator<Item = (&'a BindGroup, u32, &'a Buffer)>,
     ) {
-        let Some(field) = self.field[gradient as usize].get() else { return };
+        let Some(field) = self.field[place_of(gradient)].get() else { return };
         let pass = ("sheetsplat.field", timestamp_writes, sheets, &self.indices);
         record_quads(encoder, pass, (&self.clear, clear_group, tiles), field, lists);
     }
+}
+
+/// The place of a gradient's pipeline.
+fn place_of(gradient: Gradient) -> usize {
+    usize::from(gradient == Gradient::Kernel)
 }

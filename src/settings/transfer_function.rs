@@ -352,6 +352,12 @@ impl TransferFunction {
         self.channels().any(|channel| channel.membership || channel.labels.values().any(|tables| tables.membership))
     }
 
+    /// Whether the opacity of any of this channel's voxels depends on its gradient.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(crate) fn is_by_gradient(&self) -> bool {
+        self.gradient_opacity.is_some() || self.labels.values().any(|tables| tables.gradient_opacity.is_some())
+    }
+
     /// The transfer function of one channel by itself.
     pub(crate) fn of_channel(&self, number: usize) -> Self {
         let own = number.checked_sub(1).map_or(self, |at| &self.further[at]);

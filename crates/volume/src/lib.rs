@@ -37,6 +37,7 @@ mod identity;
 mod index;
 mod inputs;
 mod label_facts;
+mod label_gradients;
 mod labels;
 mod loaded;
 mod located;

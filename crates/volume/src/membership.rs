@@ -6,10 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, UVec3};
 
-use super::sample_type::Sample;
-use super::value_slice::ValueSlice;
-use super::{Grid, Volume};
-use crate::for_type;
+use super::grid::Grid;
 
 /// How far the window reaches from its voxel along each axis.
 #[doc(hidden)]
@@ -47,7 +44,6 @@ pub enum Members {
 /// The gradients of the membership of every voxel's own label.
 #[derive(Debug)]
 struct Membership {
-    of: Members,
     across: UVec3,
     /// The only label of each block; NaN where there are several, or a hole. No block waits for another, which might be a task of the same thread.
     only: Box<[OnceLock<f32>]>,
@@ -56,7 +52,7 @@ struct Membership {
 
 /// The gradients in a block, where a voxel has one.
 #[derive(Debug)]
-struct Block {
+pub(super) struct Block {
     /// Which voxels have one: a bit each, x fastest.
     has: [u64; SIDE],
     /// Their gradients, in membership per voxel along each axis.
@@ -64,9 +60,10 @@ struct Block {
 }
 
 impl Block {
-    /// A voxel's gradient, given by its place in the block.
-    fn at(&self, slot: usize) -> [f32; 3] {
-        let (word, bit) = (slot / 64, slot % 64);
+    /// The gradient of one of its voxels, in membership per voxel.
+    pub(super) fn at(&self, voxel: UVec3) -> [f32; 3] {
+        let [x, y, word] = voxel.to_array().map(|at| at as usize % SIDE);
+        let bit = x + SIDE * y;
         if self.has[word] >> bit & 1 == 0 {
             return [0.0; 3];
         }
@@ -75,88 +72,40 @@ impl Block {
     }
 }
 
-impl Volume {
-    /// The gradient of the membership of a voxel's label (SPEC §15) per world unit: smoothed over the 4 voxels on every side, 0 where all these have one
-    /// label, and in a hole. A volume that is not segmented has no gradients [`Members::OfLabels`].
-    ///
-    /// # Panics
-    /// If the voxel lies outside the volume.
-    pub fn membership_gradient(&self, of: Members, voxel: UVec3) -> DVec3 {
-        let (dims, spacing) = (self.dims(), self.spacing());
-        assert!(voxel.cmplt(dims).all(), "voxel {voxel} outside {dims}");
-        let block = self.membership(of).block(self, voxel / SIDE as u32);
-        DVec3::from(block.map_or([0.0; 3], |block| block.at(slot(voxel))).map(f64::from)) / spacing
+impl KeptMembership {
+    /// The gradients in the block of a voxel of a grid, if any voxel of the block has one. `label` tells the label of a voxel, given by its index: NaN in a hole.
+    pub(super) fn block(&self, grid: &Grid, voxel: UVec3, label: impl Fn(usize) -> f32) -> Option<&Block> {
+        let all = self.0.get_or_init(|| Membership::new(grid));
+        let (at, label) = (voxel / SIDE as u32, &label);
+        let gradients = || if all.is_plain(grid, at, label) { None } else { block(label, grid, at) };
+        all.blocks[all.number(at)].get_or_init(gradients).as_deref()
     }
-
-    /// Whether the values in a block of 8×8×8 voxels, given by its place among blocks, have any gradient of membership.
-    #[doc(hidden)]
-    pub fn has_membership(&self, block: UVec3) -> bool {
-        self.membership(Members::OfValues).block(self, block).is_some()
-    }
-
-    /// Where [`Self::membership_gradient`] keeps what it computes.
-    fn membership(&self, of: Members) -> &Membership {
-        self.membership[of as usize].0.get_or_init(|| Membership::new(self, of))
-    }
-}
-
-fn slot(voxel: UVec3) -> usize {
-    let [x, y, z] = voxel.to_array().map(|at| at as usize % SIDE);
-    x + SIDE * (y + SIDE * z)
 }
 
 impl Membership {
-    fn new(volume: &Volume, of: Members) -> Self {
-        let across = volume.dims().map(|count| count.div_ceil(SIDE as u32));
+    fn new(grid: &Grid) -> Self {
+        let across = grid.dims.map(|count| count.div_ceil(SIDE as u32));
         let count = 0..across.element_product();
         let (only, blocks) = (count.clone().map(|_| OnceLock::new()), count.map(|_| OnceLock::new()));
-        Self { of, across, only: only.collect(), blocks: blocks.collect() }
+        Self { across, only: only.collect(), blocks: blocks.collect() }
     }
 
-    /// The gradients of a block, given by its place among blocks.
-    fn block(&self, volume: &Volume, at: UVec3) -> Option<&Block> {
-        let number = Grid::new(self.across, DVec3::ONE).index_of(at) as usize;
-        let gradients = || match self.of {
-            _ if self.is_plain(volume, at) => None,
-            Members::OfValues => {
-                for_type!(ValueSlice, volume.values(), values => block(|index| values[index].to_f32(), volume.grid(), at))
-            }
-            Members::OfLabels => block(label_beside(volume), volume.grid(), at),
-        };
-        self.blocks[number].get_or_init(gradients).as_deref()
+    fn number(&self, at: UVec3) -> usize {
+        Grid::new(self.across, DVec3::ONE).index_of(at) as usize
     }
 
     /// Whether a block and those around it have one label.
-    fn is_plain(&self, volume: &Volume, at: UVec3) -> bool {
-        let here = self.only_label(volume, at);
+    fn is_plain(&self, grid: &Grid, at: UVec3, label: &impl Fn(usize) -> f32) -> bool {
+        let only = |at: UVec3| *self.only[self.number(at)].get_or_init(|| only(label, grid, at));
+        let here = only(at);
         let [low, high] = [at.saturating_sub(UVec3::ONE), (at + 1).min(self.across - 1)];
         let mut around = (low.z..=high.z).flat_map(|z| (low.y..=high.y).map(move |y| UVec3::new(0, y, z)));
-        around.all(|row| (low.x..=high.x).all(|x| self.only_label(volume, row.with_x(x)) == here))
-    }
-
-    /// The only label of a block, or NaN.
-    fn only_label(&self, volume: &Volume, at: UVec3) -> f32 {
-        let number = Grid::new(self.across, DVec3::ONE).index_of(at) as usize;
-        *self.only[number].get_or_init(|| match self.of {
-            Members::OfValues => {
-                for_type!(ValueSlice, volume.values(), values => only(|index| values[index].to_f32(), volume.grid(), at))
-            }
-            Members::OfLabels => only(label_beside(volume), volume.grid(), at),
-        })
-    }
-}
-
-/// Tells the labels of a segmented volume's voxels, given by their indices; NaN in holes.
-fn label_beside(volume: &Volume) -> impl Fn(usize) -> f32 {
-    let (values, labels, has_holes) = (volume.values(), volume.labels().unwrap_or_default(), volume.holes() > 0);
-    move |index| match labels.get(index) {
-        Some(&label) if !has_holes || !values.at(index).is_nan() => label.into(),
-        _ => f32::NAN,
+        around.all(|row| (low.x..=high.x).all(|x| only(row.with_x(x)) == here))
     }
 }
 
 /// The only label of a block, or NaN.
-fn only(label: impl Fn(usize) -> f32, grid: &Grid, at: UVec3) -> f32 {
+fn only(label: &impl Fn(usize) -> f32, grid: &Grid, at: UVec3) -> f32 {
     let low = at * SIDE as u32;
     let high = (low + SIDE as u32).min(grid.dims);
     let first = label(grid.index_of(low) as usize);
@@ -200,7 +149,7 @@ impl Taps {
 }
 
 /// The gradients of a block; `None` if no voxel has one.
-fn block(label: impl Fn(usize) -> f32, grid: &Grid, at: UVec3) -> Option<Box<Block>> {
+fn block(label: &impl Fn(usize) -> f32, grid: &Grid, at: UVec3) -> Option<Box<Block>> {
     let first = at * SIDE as u32;
     let labels = around(label, grid, first);
     let mut present: Vec<f32> = Vec::new();
@@ -241,7 +190,7 @@ fn inside(grid: &Grid, first: UVec3) -> [UVec3; 2] {
 }
 
 /// The labels that bear on a block; NaN beyond the border, as in holes.
-fn around(label: impl Fn(usize) -> f32, grid: &Grid, first: UVec3) -> Vec<f32> {
+fn around(label: &impl Fn(usize) -> f32, grid: &Grid, first: UVec3) -> Vec<f32> {
     let mut labels = vec![f32::NAN; SPAN * SPAN * SPAN];
     let [low, end] = inside(grid, first);
     for z in low.z..end.z {

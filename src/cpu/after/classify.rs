@@ -263,18 +263,24 @@ impl Frame<'_> {
         Some(labels)
     }
 
-    /// The means of some of eight pixels between two values, given the labels there.
+    /// The means of some of eight pixels between two values, given the labels there; if they only tell what is visible, nothing but the amounts.
     #[inline(always)]
-    fn means_between<S: Simd>(&self, simd: S, lanes: u32, values: [f32x8<S>; 2], labels: &Option<Labels>) -> Means<S> {
+    fn means_between<S: Simd>(
+        &self,
+        simd: S,
+        lanes: (u32, bool),
+        values: [f32x8<S>; 2],
+        labels: &Option<Labels>,
+    ) -> Means<S> {
         let table_of = labels.as_ref().map(|labels| |lane: usize| self.integrals.table(labels[lane]));
         self.integrals.means(simd, lanes, values, table_of)
     }
 
-    /// The means of eight pixels in a slab.
+    /// The mean amounts of eight pixels in a slab.
     #[inline(always)]
     pub(super) fn means<S: Simd>(&self, simd: S, slab: &Slab<S>, looks: &Looks<'_>, at: [usize; 2]) -> Means<S> {
         let labels = self.slab_labels(slab.number, slab.lanes, looks, at);
-        self.means_between(simd, slab.lanes, slab.values, &labels)
+        self.means_between(simd, (slab.lanes, true), slab.values, &labels)
     }
 
     /// The number in the middle of a cubic slab (SPEC §9), given its mean amount: that of the cubic through the values and slopes at its planes; on the line between
@@ -322,7 +328,7 @@ impl Frame<'_> {
         let mut middle = zero;
         // The whole slab, which tells what is visible, and then the halves of the cubic profile: one place for all, because much is compiled into it.
         for step in 0..=2 {
-            let means = self.means_between(simd, lanes, values, &labels);
+            let means = self.means_between(simd, (lanes, step == 0 && self.segments > 1), values, &labels);
             let visible = means.visible(simd, lanes);
             let mut part = [step as f32 * 0.5 - 0.5, 0.5];
             if step == 0 {

@@ -190,12 +190,12 @@ impl Integrals {
         label.and_then(|label| self.labels.get(&label)).unwrap_or(&self.plain)
     }
 
-    /// The means of the lanes that have a bit, given the table of each.
+    /// The means of the lanes that have a bit, given the table of each; if they only tell what is visible, nothing but the amounts.
     #[inline(always)]
     pub(super) fn means<'a, S: Simd>(
         &self,
         simd: S,
-        lanes: u32,
+        (lanes, only_tell): (u32, bool),
         [f0, f1]: [f32x8<S>; 2],
         table_of: Option<impl Fn(usize) -> &'a Table>,
     ) -> Means<S> {
@@ -238,9 +238,9 @@ impl Integrals {
         let is_counted = mask(simd, between.lanes);
         let (low, size) = (is_counted.select(between.low, zero), is_counted.select(size, zero));
         let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
-        let mut sums = self.part(simd, &near, low);
+        let mut sums = self.part(simd, &near, low, only_tell);
         if has_far {
-            let far = self.part(simd, &far, low);
+            let far = self.part(simd, &far, low, only_tell);
             sums = std::array::from_fn(|at| sums[at] + far[at] + load(&whole[at]));
         }
         let [amount, moment, red, green, blue] = sums;
@@ -257,15 +257,13 @@ impl Integrals {
         }
     }
 
-    /// The sums over parts of cells, by two Gauss nodes.
+    /// The sums over parts of cells, by two Gauss nodes; only that of m, if it only tells what is visible.
     #[inline(always)]
-    fn part<S: Simd>(&self, simd: S, parts: &Parts<'_>, low: f32x8<S>) -> Sums<S> {
+    fn part<S: Simd>(&self, simd: S, parts: &Parts<'_>, low: f32x8<S>, only_tell: bool) -> Sums<S> {
         let load = |lanes: &[f32; LANES]| f32x8::load_array_ref(simd, lanes);
         let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let (from, to, weight) = (load(&parts.from), load(&parts.to), load(&parts.weight) * 0.5);
         let [start, per_width, alpha_at_start, rise] = parts.entry(simd, 0);
-        let ([red, green, blue, _], [red_rise, green_rise, blue_rise, _]) =
-            (parts.entry(simd, 1), parts.entry(simd, 2));
         // Both nodes at once.
         let twice = |of: f32x8<S>| of.combine(of);
         let share = f32x8::splat(simd, 0.5 - NODE as f32).combine(f32x8::splat(simd, 0.5 + NODE as f32));
@@ -276,6 +274,11 @@ impl Integrals {
             let (first, second) = of.split();
             first + second
         };
+        if only_tell {
+            return [sum(m), zero, zero, zero, zero];
+        }
+        let ([red, green, blue, _], [red_rise, green_rise, blue_rise, _]) =
+            (parts.entry(simd, 1), parts.entry(simd, 2));
         let of_color = |at_start: f32x8<S>, rise: f32x8<S>| sum(m * (twice(at_start) + twice(rise) * u));
         [
             sum(m),

@@ -103,7 +103,6 @@ impl<'a> Pages<'a> {
         view: &ViewGeometry,
     ) -> Result<Option<Self>, RenderError> {
         let transfer = scene.resolve(&volume.sample);
-        // The gradients of membership lie in no pages.
         if transfer.has_membership() {
             return Ok(None);
         }
@@ -116,13 +115,9 @@ impl<'a> Pages<'a> {
             coefficients: None,
             bearing: Bearing::of(splatting.compositing),
         });
-        let is_by_gradient = |transfer: &TransferFunction| {
-            let of_labels = transfer.labels.values().any(|tables| tables.gradient_opacity.is_some());
-            transfer.gradient_opacity.is_some() || of_labels
-        };
         let rim = match &needs {
             Some(needs) => needs.reach.along,
-            None => UVec3::splat(u32::from(transfer.channels().any(is_by_gradient))),
+            None => UVec3::splat(u32::from(transfer.channels().any(TransferFunction::is_by_gradient))),
         };
         let hollow = chunks.channels().map(|channel| HollowChannel {
             labels: channel.levels().count() > 1,

@@ -8,6 +8,7 @@ use sheetsplat::internals::reference::{self, Host};
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::{
     Classification, Compositing, Gradient, Interpolation, LabelTables, Light, Method, Order, Projection, Ramp,
+    SlabProfile,
 };
 use sheetsplat::volume::{Labels, Volume};
 
@@ -341,6 +342,7 @@ fn culling_keeps_its_guarantee() {
     let mut culled = 0;
     for case in 0..60 {
         let (volume, mut scene) = random_after(&mut random);
+        scene.splatting.slab_profile = [SlabProfile::Linear, SlabProfile::Cubic][case % 2];
         let [with, without] = [true, false].map(|culling| {
             scene.splatting.culling = culling;
             draw(&volume, &scene)
