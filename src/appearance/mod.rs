@@ -11,6 +11,7 @@ mod padding;
 mod preset;
 mod quantile;
 mod shown_range;
+mod split;
 mod suggestion;
 mod xray;
 
@@ -23,7 +24,7 @@ pub use quantile::{histogram, quantiles};
 pub use shown_range::shown_range;
 
 use crate::settings::transfer_function::{Ramp, TransferFunction};
-use crate::volume::Volume;
+use crate::volume::{ValueSlice, Volume};
 use haze::constant;
 use object::Object;
 
@@ -38,6 +39,13 @@ impl TransferFunction {
             |labels| categories::transfer(&labels, volume.palette().unwrap_or_default()),
         )
     }
+}
+
+/// Whether few values, such as -1e30, are so far from the others that an `f32` cannot tell these apart where all values are scaled to about 1, as for classification
+/// after splatting (SPEC §9).
+pub(crate) fn exceeds_digits(volume: &Volume) -> bool {
+    // Values of 8 or 16 bits never do.
+    matches!(volume.values(), ValueSlice::F32(_)) && Object::find(volume.values()).is_some_and(|of| of.exceeds_digits)
 }
 
 /// The transfer function of one of several channels that comes without one, in its file's colour or one given: as with [`Preset::Confocal`], or for a

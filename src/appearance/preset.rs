@@ -217,8 +217,9 @@ pub(super) fn translucent_labels() -> Ramp<f64> {
 /// White, with an opacity that rises from the background to a value that few voxels exceed.
 fn mip(values: ValueSlice<'_>, object: &Object) -> TransferFunction {
     const TAIL: f64 = 0.0005;
-    let background = object.background;
-    let top = quantiles(values, |value| f64::from(value) > background, [1.0 - TAIL]);
+    let (background, ceiling) = (object.background, object.ceiling);
+    let is_shown = |value| background < f64::from(value) && f64::from(value) <= ceiling;
+    let top = quantiles(values, is_shown, [1.0 - TAIL]);
     let top = top.map_or(object.bright, |[top]| f64::from(top));
     let color = Ramp::through(vec![(background, DVec3::ONE)]);
     TransferFunction::by_value(color, Ramp::through(vec![(background, 0.0), (top, 1.0)]))

@@ -34,7 +34,7 @@ pub use open::OpenVolume;
 pub use source::VolumeSource;
 pub use transfer_settings::TransferSettings;
 
-use crate::appearance::{Eye, Preset, categories};
+use crate::appearance::{Eye, Preset, categories, exceeds_digits};
 use crate::error::setting::SettingError;
 use crate::lists::extent;
 use crate::settings::camera::Camera;
@@ -241,8 +241,11 @@ impl Scene {
         }
         let preset = Preset::suggested(volume).unwrap_or(Preset::None);
         let transfer = TransferSettings { preset: Some(preset), ..self.transfer.clone() };
-        let (shading, splatting) =
-            (self.fitting.shading(self.shading, preset), self.fitting.splatting(self.splatting, preset));
+        let shading = self.fitting.shading(self.shading, preset);
+        let mut splatting = self.fitting.splatting(self.splatting, preset);
+        if splatting.classification == Classification::Auto && exceeds_digits(volume) {
+            splatting.classification = Classification::Before;
+        }
         Self { transfer, shading, splatting, fitting: Fitting::NONE, ..self.clone() }
     }
 

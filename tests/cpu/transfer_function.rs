@@ -4,10 +4,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use glam::{DVec3, UVec3};
+use sheetsplat::appearance::Preset;
 use sheetsplat::scene::{Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::{Ramp, RampError, TransferFunction};
 use sheetsplat::volume::Volume;
 
+use crate::common::Random;
 use crate::common::shared::shared;
 
 #[test]
@@ -153,6 +155,70 @@ fn chosen_for_noisy_data() {
     assert!(transfer.alpha(0.0, 0.0) == 0.0 && transfer.alpha(35.0, 0.0) == 0.9);
     let [(_, dark), (_, bright)] = transfer.color.points()[..] else { panic!("two colours") };
     assert!(bright.cmpge(dark).all());
+}
+
+/// A body of soft tissue with bone in air, a fifth of its voxels; every `period`th voxel has another value, in a run.
+fn body_with(count: usize, wild: f32) -> Vec<f32> {
+    let noise = |at: usize| (at * 7919 % 49) as f32 - 24.0;
+    let body = |at: usize| match at % 20 {
+        0 => 900.0,
+        5 | 10 | 15 => 40.0,
+        _ => -1000.0,
+    };
+    let mut values: Vec<f32> = (0..85_184).map(|at| body(at) + noise(at)).collect();
+    (0..count).for_each(|at| values[at * 97] = wild + if wild == 26_000.0 { noise(at) * 60.0 } else { 0.0 });
+    values
+}
+
+/// Metal, a clipped artefact, or a number for what was not measured, in up to one voxel of 200.
+#[test]
+fn few_wild_values_do_not_hide_the_rest() {
+    let body = chosen(body_with(0, 0.0));
+    assert!((-600.0..-300.0).contains(&surface(&body)), "{body:?}");
+    for count in [17, 85, 425] {
+        for wild in [26_000.0, 32_767.0, -32_768.0, 1e30, -1e30, f32::MAX] {
+            let values = body_with(count, wild);
+            let transfer = chosen(values.clone());
+            assert!((surface(&transfer) - surface(&body)).abs() < 40.0, "{count} of {wild}: {transfer:?}");
+            assert!(transfer.alpha(40.0, 0.0) > 0.8 && transfer.alpha(-1000.0, 0.0) == 0.0, "{count} of {wild}");
+            // The colours tell the body apart, not the wild values.
+            let [(_, _), (bright, _)] = transfer.color.points()[..] else { panic!("two colours") };
+            assert!((800.0..1000.0).contains(&bright), "{count} of {wild}: {bright}");
+            for preset in [Preset::Mip, Preset::Xray] {
+                let volume = Volume::new("test", UVec3::new(44, 44, 44), DVec3::ONE, values.clone()).unwrap();
+                let alone = Volume::new("test", UVec3::new(44, 44, 44), DVec3::ONE, body_with(0, 0.0)).unwrap();
+                let [wild_alpha, alpha] = [&volume, &alone].map(|volume| preset.transfer(volume).alpha(900.0, 0.0));
+                let has_high = wild > 0.0;
+                assert!(!has_high || (wild_alpha / alpha - 1.0).abs() < 0.2, "{count} of {wild}: {wild_alpha} {alpha}");
+            }
+        }
+        // Both at once, and holes.
+        let mut values = body_with(count, 1e30);
+        (0..count).for_each(|at| values[at * 101 + 50] = -1e30);
+        (0..9).for_each(|at| values[at * 103 + 7] = f32::NAN);
+        let transfer = TransferFunction::from_histogram(&volume(values));
+        assert!((surface(&transfer) - surface(&body)).abs() < 40.0, "{count}: {transfer:?}");
+    }
+}
+
+/// Rare values that are no mistakes: beads in noise, and a tail of brightness such as that of labelled cells in tissue.
+#[test]
+fn rare_objects_stay() {
+    let mut random = Random(7);
+    // The sum of twelve numbers is nearly normal.
+    let mut noise = || (0..12).map(|_| random.uniform(0.0, 10.0)).sum::<f64>();
+    let beads = |at: usize| if at.is_multiple_of(250) { 4000.0 } else { noise() as f32 };
+    let threshold = surface(&chosen((0..100_000).map(beads).collect()));
+    assert!((1500.0..3000.0).contains(&threshold), "{threshold}");
+    let mut random = Random(8);
+    let mut uniform = || random.uniform(0.0, 1.0);
+    let cells = |at: usize| match at % 200 {
+        0 => 200.0 - 1200.0 * (1.0 - uniform()).ln() as f32,
+        of if of.is_multiple_of(2) => 100.0 + 10.0 * uniform() as f32,
+        _ => 200.0 + 10.0 * uniform() as f32,
+    };
+    let threshold = surface(&chosen((0..100_000).map(cells).collect()));
+    assert!(threshold > 400.0, "{threshold}");
 }
 
 #[test]

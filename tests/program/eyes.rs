@@ -97,6 +97,39 @@ fn files_tell_where_the_camera_stands() {
     }
 }
 
+/// A disc in one or two slices is seen face on, along whichever axis they lie.
+#[test]
+fn discs_in_one_slice_are_seen_face_on() {
+    let folder = Folder::new();
+    for thin in 0..3 {
+        for slices in [1, 2] {
+            let mut dims = [32; 3];
+            dims[thin] = slices;
+            let [nx, ny, nz] = dims;
+            let value = |at: usize| {
+                let place = [at % nx, at / nx % ny, at / nx / ny];
+                let squares = (0..3).filter(|&axis| axis != thin).map(|axis| (place[axis] as f32 - 15.5).powi(2));
+                if squares.sum::<f32>() < 144.0 { 200.5 } else { 0.0 }
+            };
+            let values: Vec<f32> = (0..nx * ny * nz).map(value).collect();
+            folder.write_nrrd("disc.nrrd", dims, [1.0; 3], &values);
+            let (width, _, pixels) = folder.pixels("disc.nrrd --backend cpu --size 40");
+            let seen: Vec<[usize; 2]> = (0..pixels.len())
+                .filter(|&at| pixels[at][..3].iter().sum::<f32>() > 0.1)
+                .map(|at| [at % width, at / width])
+                .collect();
+            let side = |axis: usize| {
+                let [least, most] = [seen.iter().map(|at| at[axis]).min(), seen.iter().map(|at| at[axis]).max()];
+                (most.unwrap() + 1 - least.unwrap()) as f64
+            };
+            let [wide, high] = [side(0), side(1)];
+            let filled = seen.len() as f64 / (wide * high);
+            assert!((wide - high).abs() <= 2.0 && wide >= 24.0, "{dims:?}: {wide} × {high}");
+            assert!((filled - std::f64::consts::FRAC_PI_4).abs() < 0.08, "{dims:?}: {filled}");
+        }
+    }
+}
+
 /// NIfTI's method 1 has axes of a patient, whatever else the file leaves open.
 #[test]
 fn a_nifti_file_without_codes_has_the_formats_axes() {

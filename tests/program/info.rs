@@ -170,3 +170,66 @@ fn files_that_are_not_volumes_are_bad_input() {
     folder.write("a.nii", "no volume");
     folder.run("info a.nii --json").assert_failure(2, &["a.nii", "header", "9 bytes", "348 bytes"]);
 }
+
+/// The facts that were taken from the file, those that were assumed, and each warning once.
+#[test]
+fn assumptions_are_told() {
+    let folder = Folder::new();
+    let json = |arguments: &str| -> Value {
+        let json: Value = serde_json::from_str(&info(&folder, &format!("{arguments} --json"))).unwrap();
+        let text = info(&folder, arguments);
+        let facts: Vec<&str> = json["assumed"].as_array().unwrap().iter().map(|fact| fact.as_str().unwrap()).collect();
+        let line = if facts.is_empty() { "nothing".to_owned() } else { facts.join("; ") };
+        assert!(text.contains(&format!("\nassumed      {line}\n")), "{text}");
+        serde_json::json!([json["assumed"], text.lines().find_map(|line| line.strip_prefix("axes         "))])
+    };
+    let array = "the array's last ones are z, y and x";
+    let orientation = "orientation: that of no patient, with right-handed axes";
+    let assumed = [&format!("axes: {array}"), "spacing: 1 along each axis", "unit: none", orientation];
+    assert_eq!(json(&fixture("c.npy")), serde_json::json!([assumed, array]));
+    let stated = "x, y and z as the file states them";
+    assert_eq!(json(&fixture("itk.nii.gz")), serde_json::json!([[], stated]));
+    // A scene's spacing and unit are stated.
+    let of_scene = json(&format!("{} --set volume.spacing=[1,2,3]", fixture("c.npy")));
+    assert_eq!(of_scene[0], serde_json::json!([assumed[0], assumed[2], assumed[3]]));
+    assert!(info(&folder, &fixture("qform-big.nii.gz")).contains("; left-handed, so that pictures have x turned\n"));
+    assert_eq!(json("builtin:cube:8"), serde_json::json!([[], Value::Null]));
+
+    let warned = folder.run(&format!("info {}", fixture("plain.tif"))).stderr;
+    assert_eq!(warned.matches("no distance between slices is given").count(), 1, "{warned}");
+}
+
+/// A header that says that values are labels decides, whatever they look like.
+#[test]
+fn labels_are_known_by_the_header_or_by_their_looks() {
+    let folder = Folder::new();
+    let of = |name: &str| -> (Value, Option<String>) {
+        let json: Value = serde_json::from_str(&info(&folder, &format!("{name} --json"))).unwrap();
+        let text = info(&folder, name);
+        (json["preset"].clone(), text.lines().find_map(|line| line.strip_prefix("labels       ")).map(str::to_owned))
+    };
+    let plain = std::fs::read(fixture("nifti2.nii")).unwrap();
+    folder.write("plain.nii", &plain);
+    assert_eq!(of("plain.nii"), (Value::Null, None));
+    let mut labels = plain;
+    labels[504..508].copy_from_slice(&1002_i32.to_le_bytes());
+    folder.write("labels.nii", labels);
+    let stated = "the file says that the values are labels";
+    assert_eq!(of("labels.nii"), ("labels".into(), Some(stated.to_owned())));
+    let run = folder.run("render labels.nii -o a.png --size 8 --backend cpu");
+    assert!(run.stderr.contains(&format!("preset labels, as {stated}")), "{}", run.stderr);
+    assert_eq!(of(&fixture("zarr/image-0.5.zarr/labels/cells")).1.as_deref(), Some(stated));
+
+    let mut fractions = std::fs::read(fixture("sform.nii")).unwrap();
+    fractions[68..70].copy_from_slice(&1002_i16.to_le_bytes());
+    folder.write("fractions.nii", fractions);
+    let refused = format!("{stated}, but some are no whole numbers from 0 to 65535");
+    let run = folder.run("render fractions.nii -o b.png --size 8 --backend cpu");
+    assert!(run.stderr.contains(&format!("{refused}: drawn as amounts")), "{}", run.stderr);
+    assert_eq!(of("fractions.nii"), (Value::Null, Some(refused)));
+
+    let regions: Vec<f32> = (0..1728_usize).map(|at| (at % 12 / 3 * 7) as f32).collect();
+    folder.write_nrrd("regions.nrrd", [12; 3], [1.0; 3], &regions);
+    let (preset, reason) = of("regions.nrrd");
+    assert!(preset == "labels" && reason.unwrap().starts_with("the values look like labels: whole numbers"));
+}

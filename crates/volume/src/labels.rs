@@ -194,7 +194,7 @@ impl Volume {
         &self.label_facts
     }
 
-    /// Whether the values are known to be labels, whatever they look like: they were resampled as labels, or their file names them.
+    /// Whether the values are known to be labels, whatever they look like: they were resampled as labels, or their file says so or names them.
     #[doc(hidden)]
     pub fn is_known_label_map(&self) -> bool {
         self.is_label_map || self.labels.is_none() && !self.label_names.is_empty()

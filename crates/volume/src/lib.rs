@@ -14,6 +14,7 @@
 mod access;
 mod adapted;
 mod address;
+mod assumed;
 pub mod builtin;
 mod channels;
 mod coefficients;

@@ -13,6 +13,10 @@ use super::voxel::{Many, Voxel};
 use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
 use crate::StoreCounts;
 
+/// The order of the axes of an array that does not name them.
+#[cfg(any(feature = "npy", feature = "zarr"))]
+pub(super) const ASSUMED_AXES: &str = "the array's last ones are z, y and x";
+
 /// The contents of a file of values or labels.
 pub(super) struct Loaded<T: Voxel> {
     pub dims: UVec3,
@@ -42,6 +46,8 @@ pub(super) struct Loaded<T: Voxel> {
     pub(super) displays: Vec<ChannelDisplay>,
     /// The levels in the file, of which the values are one.
     pub(super) levels: Option<Levels>,
+    /// The order of axes that was assumed, if the file states none.
+    pub(super) assumed_axes: Option<&'static str>,
     /// One value per voxel, x fastest, channel by channel.
     pub values: T::Many,
 }
@@ -53,13 +59,15 @@ pub(super) struct Legend {
     pub(super) names: BTreeMap<u16, String>,
     /// Their colours, in ascending order of values.
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
+    /// Whether the file says that all values are labels, with or without names.
+    pub(super) are_labels: bool,
 }
 
 impl Legend {
     /// Colours of values without names.
     #[cfg(any(feature = "dicom", feature = "tiff"))]
     pub(super) fn of_palette(palette: Option<Vec<(f64, DVec3)>>) -> Self {
-        Self { names: BTreeMap::new(), palette }
+        Self { palette, ..Self::default() }
     }
 }
 
@@ -97,6 +105,7 @@ impl<T: Voxel> Loaded<T> {
             series_names,
             displays,
             levels,
+            assumed_axes: None,
             values,
         }
     }
@@ -104,7 +113,7 @@ impl<T: Voxel> Loaded<T> {
     /// The facts that the file, of some format, states about one of its channels, `number` among those that are read. The first channel has the facts that concern all.
     pub(super) fn facts(&self, format: &'static str, channel: usize, number: usize) -> StoreFacts {
         let Self { series, spacing, unit, .. } = self;
-        let Legend { names: label_names, palette } = self.legend(channel, number);
+        let Legend { names: label_names, palette, are_labels } = self.legend(channel, number);
         let orientation = self.orientation.filter(|_| number == 0);
         let channels = if series.is_color { 1 } else { series.channels };
         let display = self.displays.get(channel).filter(|display| **display != ChannelDisplay::default());
@@ -116,6 +125,8 @@ impl<T: Voxel> Loaded<T> {
             orientation,
             palette,
             label_names,
+            are_labels,
+            assumed_axes: self.assumed_axes,
             channel_name: self.channel_names.get(channel).cloned(),
             display: display.cloned(),
             time_names: self.time_names.clone(),

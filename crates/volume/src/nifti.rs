@@ -15,7 +15,7 @@ use super::VolumeError;
 use super::access::Access;
 use super::error::volume::{invalid, io_error};
 use super::grid::{SIZES, dims_of};
-use super::loaded::Loaded;
+use super::loaded::{Legend, Loaded};
 use super::orientation::Orientation;
 use super::sample_type::SampleType;
 use super::samples::Samples;
@@ -46,6 +46,9 @@ const COMPLEX_TYPES: [(i64, SampleType); 2] = [(32, SampleType::F32), (1792, Sam
 
 /// The code of millimetres.
 const MILLIMETERS: u8 = 2;
+
+/// The intent of values that are labels, `NIFTI_INTENT_LABEL`.
+const LABELS: i64 = 1002;
 
 /// The fields with the sform.
 const SFORM: &str = "srow_x, srow_y, srow_z";
@@ -80,7 +83,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         stream.series::<T>(&samples, &series, false)?
     };
     let (spacing, unit) = (Some(lattice.spacing), header.unit());
-    let loaded = Loaded { spacing, unit, orientation, series, ..Loaded::new(dims, kind, values) };
+    let legends = vec![Legend { are_labels: header.intent_code == LABELS, ..Legend::default() }];
+    let loaded = Loaded { spacing, unit, orientation, legends, series, ..Loaded::new(dims, kind, values) };
     lattice.straighten(path, SFORM, loaded, access)
 }
 
@@ -137,6 +141,7 @@ struct Header {
     xyzt_units: u8,
     vox_offset: f64,
     slope_and_intercept: [f64; 2],
+    intent_code: i64,
     qform_code: i64,
     sform_code: i64,
     quatern_bcd: DVec3,
@@ -227,6 +232,7 @@ impl Header {
                 xyzt_units: if is_analyze { MILLIMETERS } else { bytes.bytes[123] },
                 vox_offset,
                 slope_and_intercept: [slope, intercept],
+                intent_code: code(68),
                 qform_code: code(252),
                 sform_code: code(254),
                 quatern_bcd: DVec3::from_array(bytes.f32s(256)),
@@ -247,6 +253,7 @@ impl Header {
             xyzt_units: i32::from_le_bytes(bytes.at(500)) as u8,
             vox_offset: i64::from_le_bytes(bytes.at(168)) as f64,
             slope_and_intercept: [slope, intercept],
+            intent_code: bytes.i32(504),
             qform_code: bytes.i32(344),
             sform_code: bytes.i32(348),
             quatern_bcd: DVec3::from_array(bytes.f64s(352)),

@@ -13,7 +13,7 @@ use super::VolumeError;
 use super::access::Access;
 use super::error::volume::invalid;
 use super::grid::{SIZES, dims_of};
-use super::loaded::Loaded;
+use super::loaded::{ASSUMED_AXES, Loaded};
 use super::sample_type::SampleType;
 use super::samples::Samples;
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
@@ -70,7 +70,7 @@ pub(super) fn read_array<T: Voxel>(path: &Path, mut stream: Stream) -> Result<Lo
     let (samples, series) = parse(path, &header(path, &mut stream)?)?;
     let Samples { dims, kind, .. } = samples;
     let values = stream.series::<T>(&samples, &series, false)?;
-    Ok(Loaded { series, ..Loaded::new(dims, kind, values) })
+    Ok(Loaded { series, assumed_axes: Some(ASSUMED_AXES), ..Loaded::new(dims, kind, values) })
 }
 
 /// The text between the header's length and the samples.

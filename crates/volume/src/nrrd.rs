@@ -271,7 +271,7 @@ impl Header {
     fn legends(&self, series: Series) -> Vec<Legend> {
         let legend = |layer: Option<u32>| {
             let names = self.segments("_Name", layer).map(|(label, name)| (label, name.clone())).collect();
-            Legend { names, palette: self.palette(layer) }
+            Legend { names, palette: self.palette(layer), are_labels: false }
         };
         if series.channels > 1 {
             (0..series.channels).map(|layer| legend(Some(layer))).collect()

@@ -41,9 +41,11 @@ impl Volume {
         let (format, loaded) = format::read::<f32>(path, access)?;
         let first_channel = access.selection().channel.unwrap_or(0) as usize;
         let channels = first_channel..(loaded.series.channels as usize).max(first_channel + 1);
-        let facts: Vec<StoreFacts> =
-            channels.enumerate().map(|(at, channel)| loaded.facts(format, channel, at)).collect();
-        let mut facts = facts.into_iter();
+        let facts = |(at, channel): (usize, usize)| {
+            let facts = loaded.facts(format, channel, at);
+            StoreFacts { spacing: access.spacing().or(facts.spacing), ..facts }
+        };
+        let mut facts = channels.enumerate().map(facts).collect::<Vec<StoreFacts>>().into_iter();
         let is_left_handed = loaded.is_left_handed();
         let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();

@@ -62,8 +62,17 @@ impl Volume {
         let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
         let values = stream.samples::<f32>(&samples, false)?;
         access.take_rounding().warn(path, kind, values.as_slice());
-        let volume = Self::from_values(&path.display().to_string(), dims, DVec3::ONE, values)?;
-        Ok(Self { encoding: Some(Encoding { format: FORMAT, sample_type: kind, channels: 1, times: 1 }), ..volume })
+        let origin = path.display().to_string();
+        Self::from_values(&origin, dims, DVec3::ONE, values)?.stating(&origin, facts(kind))
+    }
+}
+
+fn facts(kind: SampleType) -> StoreFacts {
+    let encoding = Encoding { format: FORMAT, sample_type: kind, channels: 1, times: 1 };
+    StoreFacts {
+        encoding: Some(encoding),
+        assumed_axes: Some("x is the fastest, then y, then z"),
+        ..StoreFacts::default()
     }
 }
 
@@ -87,8 +96,6 @@ pub fn raw_store(path: &Path, layout: &RawLayout, access: &Access) -> Result<Arc
         return Err(samples.mismatch(path, left));
     }
     let located = Located { path: path.to_owned(), at, samples, series: Series::default() };
-    let encoding = Encoding { format: FORMAT, sample_type: kind, channels: 1, times: 1 };
-    let facts = StoreFacts { encoding: Some(encoding), ..StoreFacts::default() };
     located.series.check(path, access.selection())?;
-    Ok(Arc::new(FileStore::new(located, 0..1, DVec3::ONE, facts, access)?))
+    Ok(Arc::new(FileStore::new(located, 0..1, DVec3::ONE, facts(kind), access)?))
 }

@@ -108,6 +108,10 @@ pub struct StoreFacts {
     pub palette: Option<Vec<(f64, DVec3)>>,
     /// The names of values, if they are labels.
     pub label_names: BTreeMap<u16, String>,
+    /// Whether the file says that all values are labels, with or without names.
+    pub are_labels: bool,
+    /// The order of axes that was assumed, if the file states none.
+    pub assumed_axes: Option<&'static str>,
     /// The channel's name.
     pub channel_name: Option<String>,
     /// How the channel is shown.

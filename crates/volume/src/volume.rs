@@ -39,6 +39,9 @@ pub struct Volume {
     pub(super) label_names: BTreeMap<u16, String>,
     /// Whether the values are known to be labels.
     pub(super) is_label_map: bool,
+    /// The order of axes that was assumed, and whether the spacing was, because the file states none.
+    pub(super) assumed_axes: Option<&'static str>,
+    pub(super) is_spacing_assumed: bool,
     pub(super) orientation: Option<Orientation>,
     pub(super) unit: Option<String>,
     pub(super) value_unit: Option<String>,
@@ -163,6 +166,8 @@ impl Volume {
             labels: None,
             label_names: BTreeMap::new(),
             is_label_map: false,
+            assumed_axes: None,
+            is_spacing_assumed: false,
             orientation: None,
             unit: None,
             value_unit: None,
@@ -205,6 +210,7 @@ impl Volume {
     pub fn with_spacing(mut self, origin: &str, spacing: DVec3) -> Result<Self, VolumeError> {
         check_spacing("spacing", spacing).map_err(|error| refused(origin, error))?;
         self.grid = self.grid.with_finest_spacing(spacing);
+        self.is_spacing_assumed = false;
         self.grid.check().map_err(|error| refused(origin, error))?;
         for channel in &mut self.further {
             Arc::make_mut(channel).grid = self.grid;
@@ -214,9 +220,11 @@ impl Volume {
 
     /// The same volume with what its file states beside its grid and values.
     pub(super) fn stating(self, origin: &str, facts: StoreFacts) -> Result<Self, VolumeError> {
-        let StoreFacts { encoding, spacing: _, unit, value_unit, orientation, palette, .. } = facts;
-        let StoreFacts { label_names, channel_name, display, time_names, series_names, .. } = facts;
+        let StoreFacts { encoding, spacing, unit, value_unit, orientation, palette, .. } = facts;
+        let StoreFacts { label_names, are_labels, assumed_axes, .. } = facts;
+        let StoreFacts { channel_name, display, time_names, series_names, .. } = facts;
         let volume = Self { encoding, unit, value_unit, palette, label_names, channel_name, display, ..self };
+        let volume = Self { is_label_map: are_labels, assumed_axes, is_spacing_assumed: spacing.is_none(), ..volume };
         Self { time_names, series_names, ..volume }.oriented(origin, orientation)
     }
 

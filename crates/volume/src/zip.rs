@@ -83,6 +83,7 @@ impl Directory {
 }
 
 /// A file in the archive.
+#[derive(Clone)]
 pub(super) struct Member {
     pub(super) name: String,
     is_encrypted: bool,

@@ -63,6 +63,31 @@ fn the_preset_that_fits_is_used_unless_anything_else_is_stated() {
     assert_eq!(other.fitted(&volume), other);
 }
 
+/// Scaled to the range of numbers such as -1e30, all other values would be one `f32`, so that nothing would be seen after splatting.
+#[test]
+fn numbers_beyond_an_f32s_digits_hide_nothing() {
+    let draw = |wild: Option<f32>, stated: &[&str]| {
+        let mut values: Vec<f32> = body().values().iter().collect();
+        wild.into_iter().for_each(|wild| values[..8].fill(wild));
+        let volume = Volume::new("body", UVec3::splat(20), DVec3::ONE, values).unwrap();
+        let scene = scene("camera = { center = [0, 0, 0], height = 20, direction = [0, 1, 0] }", stated);
+        let pixels = cpu::render(volume.clone(), &scene).unwrap().image.pixels;
+        let lit = pixels.iter().filter(|pixel| pixel[..3].iter().sum::<f32>() > 0.2).count();
+        (lit, scene.fitted(&volume).classification(&volume))
+    };
+    let (alone, classification) = draw(None, &[]);
+    assert_eq!((alone > 40, classification), (true, Classification::After), "{alone}");
+    for (wild, expected) in
+        [(-1e30, Classification::Before), (1e30, Classification::Before), (-32_768.0, Classification::After)]
+    {
+        let (lit, classification) = draw(Some(wild), &[]);
+        assert!(classification == expected && lit * 10 >= alone * 9, "{wild}: {lit} of {alone}, {classification:?}");
+    }
+    // A stated key stays.
+    let (_, classification) = draw(Some(-1e30), &["splatting.classification=after"]);
+    assert_eq!(classification, Classification::After);
+}
+
 #[test]
 fn no_preset_is_the_surface_of_the_histogram() {
     let volume = body();

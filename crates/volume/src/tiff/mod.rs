@@ -106,7 +106,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         _ => {
             let loaded = slices.finish(&calibration)?;
             let series = if loaded.series.is_color { Series { times: series.times, ..loaded.series } } else { series };
-            Ok(Loaded { series, ..loaded })
+            let assumed_axes = (stack.is_none() && count > 1).then_some("pages are slices along z");
+            Ok(Loaded { series, assumed_axes, ..loaded })
         }
     }
 }
@@ -138,7 +139,8 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Acc
     for (slice, file) in (0..).zip(slices_of_one_kind) {
         slices.add(&mut Pages::open(file, access)?, (0, slice), access)?;
     }
-    slices.finish(&calibration)
+    let assumed_axes = Some("files are slices along z, in the order of their names");
+    Ok(Loaded { assumed_axes, ..slices.finish(&calibration)? })
 }
 
 /// The slices of a channel in the order of the file.

@@ -42,6 +42,8 @@ pub(super) struct ZarrArray {
     shards: Option<Shards>,
     chunk_keys: ChunkKeys,
     axes: Axes,
+    /// Whether the order of axes is assumed, as nothing names them.
+    pub(super) are_axes_assumed: bool,
     pub(super) kind: SampleType,
     /// The bytes of the value of voxels in chunks that the store does not hold, and whether the metadata state it.
     fill: Vec<u8>,
@@ -110,6 +112,7 @@ impl ZarrArray {
             };
             invalid(&file, "shape", format!("{} dimensions", shape.len()), allowed)
         };
+        let mut are_axes_assumed = false;
         let axes = match axes {
             Some(axes) => Some(*axes).filter(|axes| axes.count() == shape.len()),
             None => {
@@ -119,6 +122,7 @@ impl ZarrArray {
                     metadata["dimension_names"] = names.clone().into();
                 }
                 Axes::named(&names).or_else(|| {
+                    are_axes_assumed = true;
                     let plain = Axes::plain(shape.len());
                     if let Some(plain) = plain.filter(|_| !Axes::say_nothing(&names)) {
                         let (file, names) = (file.display(), names.join(", "));
@@ -158,6 +162,7 @@ impl ZarrArray {
             keys,
             path,
             metadata,
+            are_axes_assumed,
             codecs,
             shards,
             chunk_keys,

@@ -57,7 +57,8 @@ pub(super) fn labels(image_label: &Json) -> Legend {
     let names = image_label.get("properties").members().iter().filter_map(name).collect();
     let colors: BTreeMap<u16, DVec3> = image_label.get("colors").members().iter().filter_map(color).collect();
     let palette: Vec<_> = colors.into_iter().map(|(value, color)| (f64::from(value), color)).collect();
-    Legend { names, palette: Some(palette).filter(|palette| !palette.is_empty()) }
+    let palette = Some(palette).filter(|palette| !palette.is_empty());
+    Legend { names, palette, are_labels: image_label.is_some() }
 }
 
 #[cfg(test)]

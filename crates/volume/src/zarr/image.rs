@@ -12,7 +12,7 @@ use super::super::address::archive_and_inner;
 use super::super::display::ChannelDisplay;
 use super::super::error::volume::{invalid, refused};
 use super::super::grid::{Grid, check_spacing};
-use super::super::loaded::{Legend, Loaded};
+use super::super::loaded::{ASSUMED_AXES, Legend, Loaded};
 use super::super::orientation::Orientation;
 use super::super::series::{MAX_CHANNELS, Series};
 use super::super::voxel::Voxel;
@@ -42,6 +42,8 @@ pub(super) struct Image {
     pub(super) channel_names: Vec<String>,
     pub(super) displays: Vec<ChannelDisplay>,
     pub(super) legend: Legend,
+    /// Whether it is an array without a scale.
+    is_plain: bool,
     /// The metadata of the image and its levels.
     pub(super) metadata: Vec<Value>,
 }
@@ -121,8 +123,12 @@ impl Image {
     /// Values of a level with what the metadata state about all of them.
     pub(super) fn stated<T: Voxel>(&self, level: usize, values: T::Many) -> Loaded<T> {
         let Level { array, grid, first } = &self.levels[level];
+        let spacing = Some(grid.spacing).filter(|_| !self.is_plain);
+        let assumed_axes = Some(ASSUMED_AXES).filter(|_| array.are_axes_assumed);
         let orientation = self.orientation.map(|axes| Orientation { axes, origin: axes * *first });
         Loaded {
+            spacing,
+            assumed_axes,
             orientation,
             unit: self.unit.clone(),
             series: self.series,
@@ -140,8 +146,8 @@ impl Image {
         let levels = vec![Level { array, grid, first: DVec3::ZERO }];
         let metadata = vec![levels[0].array.metadata()];
         let (channel_names, displays, legend) = (Vec::new(), Vec::new(), Legend::default());
-        let (unit, orientation, series) = (None, None, series_of(&keys, &levels)?);
-        Ok(Self { keys, levels, unit, orientation, series, channel_names, displays, legend, metadata })
+        let (unit, orientation, series, is_plain) = (None, None, series_of(&keys, &levels)?, true);
+        Ok(Self { keys, levels, unit, orientation, series, channel_names, displays, legend, is_plain, metadata })
     }
 
     /// The image whose levels lie below a group of a store.
@@ -194,10 +200,21 @@ impl Image {
             levels.push(Level { array, grid, first: dataset.first });
         }
         let (channel_names, displays) = display::channels(&ome.get("omero"));
-        let legend = display::labels(&ome.get("image-label"));
+        let mut legend = display::labels(&ome.get("image-label"));
+        legend.are_labels = legend.are_labels || is_listed_as_labels(&keys);
+        let is_plain = false;
         let (unit, orientation, series) = (multiscale.unit, multiscale.orientation, series_of(&keys, &levels)?);
-        Ok(Self { keys, levels, unit, orientation, series, channel_names, displays, legend, metadata })
+        Ok(Self { keys, levels, unit, orientation, series, channel_names, displays, legend, is_plain, metadata })
     }
+}
+
+/// Whether the group `labels` in which an image lies lists it.
+fn is_listed_as_labels(keys: &Keys) -> bool {
+    const LABELS: &str = "labels";
+    let Some((group, name)) = keys.of_group(LABELS) else { return false };
+    // An image may be opened where its surroundings may not be.
+    let node = Node::read(&group, "").ok().flatten();
+    node.is_some_and(|node| node.ome().get(LABELS).members().iter().any(|member| member.text() == Some(&name)))
 }
 
 /// The channels and times, which all levels have.

@@ -69,6 +69,30 @@ impl Keys {
         Err(invalid(path, "format", "an address, which needs the feature `http`", "a folder or an archive"))
     }
 
+    /// The keys of the group that holds this store, if it has a name, and the name of this store in it.
+    pub(super) fn of_group(&self, group: &str) -> Option<(Self, String)> {
+        let parts = |path: &Path| {
+            let parent = path.parent().filter(|parent| parent.ends_with(group))?.to_owned();
+            Some((parent, path.file_name()?.to_str()?.to_owned()))
+        };
+        match &self.place {
+            Place::Folder(_) => parts(&self.path).map(|(parent, name)| (Self::of_folder(&parent, &self.access), name)),
+            Place::Archive(members, prefix) => {
+                let (parent, name) = parts(Path::new(prefix))?;
+                let place = Place::Archive(members.clone(), format!("{}/", parent.to_str()?));
+                Some((Self::new(&self.path, place, &self.access), name))
+            }
+            #[cfg(feature = "http")]
+            Place::Address(_) => {
+                let text = self.path.to_str()?;
+                let (path, query) = text.split_at(text.find('?').unwrap_or(text.len()));
+                let (parent, name) = parts(Path::new(path))?;
+                let parent = PathBuf::from(format!("{}{query}", parent.to_str()?));
+                Some((Self::of_address(&parent, &self.access).ok()?, name))
+            }
+        }
+    }
+
     fn new(path: &Path, place: Place, access: &Access) -> Self {
         Self { path: path.to_owned(), place, access: access.clone(), limit: AtomicU64::new(MAX_HEADER) }
     }

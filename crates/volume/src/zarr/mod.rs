@@ -87,10 +87,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         chunk_bytes: bytes,
         ..StoreCounts::default()
     };
-    let spacing = Some(level.grid.spacing);
     let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
     let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid, reads });
-    Ok(Loaded { spacing, levels, ..image.stated::<T>(number, values) })
+    Ok(Loaded { levels, ..image.stated::<T>(number, values) })
 }
 
 /// The grids of an image's levels, from the finest.
@@ -142,8 +141,7 @@ pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result
     let image = Arc::new(image);
     let levels = image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() });
     let levels: Vec<StoreLevel> = levels.collect();
-    let spacing = Some(image.levels[0].grid.spacing);
-    let stated = Loaded { spacing, ..image.stated::<f32>(0, Values::default()) };
+    let stated = image.stated::<f32>(0, Values::default());
     let time = u64::from(selection.time.unwrap_or(0));
     let store = |(at, channel): (usize, u32)| {
         let facts = stated.facts(format, channel as usize, at);

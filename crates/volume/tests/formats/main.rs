@@ -3,6 +3,7 @@
 
 #![expect(clippy::unwrap_used, reason = "tests")]
 
+mod assumed;
 mod boxes;
 mod builtin;
 mod colors;

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 use glam::DVec3;
 use serde::{Serialize, Serializer};
-use sheetsplat::appearance::{Preset, quantiles};
+use sheetsplat::appearance::{Preset, categories, quantiles};
 use sheetsplat::internals::plain_whole;
 use sheetsplat::scene::{OpenVolume, Scene, VolumeSource};
 use sheetsplat::settings::{Camera, Projection};
@@ -85,6 +85,8 @@ struct Info {
     eye: String,
     /// The preset that fits, if any.
     preset: Option<&'static str>,
+    /// The facts that were assumed, as nothing states them.
+    assumed: Vec<String>,
 }
 
 /// What the camera shows, in world units from the volume's centre.
@@ -146,6 +148,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         frame: Frame::of(&scene.camera),
         eye: eye.map_or_else(|| "where it is stated".to_owned(), |eye| eye.to_string()),
         preset: Preset::ALL.iter().find(|(_, preset)| suggested == Some(*preset)).map(|(name, _)| *name),
+        assumed: assumed(volume, &scene),
     };
     let text = if arguments.json {
         serde_json::to_string(&info).map_err(|error| Failure::Other(error.to_string()))? + "\n"
@@ -214,6 +217,9 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
         let sizes = sizes.collect::<Vec<_>>().join(", ");
         line("levels", format!("{sizes}; what is told is about {}, by --level", info.level));
     }
+    if let Some(found) = labels(volume) {
+        line("labels", found.to_owned());
+    }
     if let Some([x, y, z]) = info.sample {
         line(
             "sample",
@@ -223,6 +229,11 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
     let turned = if volume.grid().is_turned() { "; left-handed, so that pictures have x turned" } else { "" };
     let stated = volume.file_orientation().map_or("not given".to_owned(), |stated| orientation(&stated));
     line("orientation", stated + turned);
+    if volume.encoding().is_some() {
+        let assumed = info.assumed.iter().find_map(|fact| fact.strip_prefix("axes: "));
+        line("axes", assumed.unwrap_or("x, y and z as the file states them").to_owned());
+    }
+    line("assumed", if info.assumed.is_empty() { "nothing".to_owned() } else { info.assumed.join("; ") });
     if info.holes > 0 {
         line("holes", format!("{} samples are NaN or infinite", info.holes));
     }
@@ -249,6 +260,30 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
     let isos: Vec<String> = histogram.iso_values().into_iter().map(short).collect();
     line("iso-values", format!("{} (suggested)", isos.join(", ")));
     text + &chart(&histogram)
+}
+
+/// Why the values count as labels, or why not though the file says that they are; `None` if nothing says so.
+fn labels(volume: &Volume) -> Option<&'static str> {
+    if volume.colors().is_some() {
+        return None;
+    }
+    Some(match (volume.is_known_label_map(), categories::is_label_map(volume)) {
+        (true, true) => "the file says that the values are labels",
+        (true, false) => "the file says that the values are labels, but some are no whole numbers from 0 to 65535",
+        (false, true) => "the values look like labels: whole numbers, at least three, in regions with sharp borders",
+        (false, false) => return None,
+    })
+}
+
+/// The facts that neither the volume's file nor the scene states.
+fn assumed(volume: &Volume, scene: &Scene) -> Vec<String> {
+    let mut assumed = volume.assumptions();
+    // The spacing of streamed volumes lies in their grids.
+    assumed.retain(|fact| scene.spacing.is_none() || !fact.starts_with("spacing"));
+    if categories::is_label_map(volume) && !volume.is_known_label_map() {
+        assumed.push("labels: the values look like labels".to_owned());
+    }
+    assumed
 }
 
 /// The anatomical directions of the file's own axes.
