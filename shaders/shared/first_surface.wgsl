@@ -78,9 +78,16 @@ fn surface_between(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, ta
     return NO_SURFACE;
 }
 
+// A surface between two samples, and the transfer function there.
+struct Surface {
+    share: f32,
+    table: Table,
+}
+
 // The same where each voxel has its own ramps: the way is split at the borders of voxels' cells. `first` and `last` are the samples' points, in
-// voxels.
-fn surface_in_cells(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, first: vec3f, last: vec3f) -> f32 {
+// voxels. Many surfaces lie on a border, where rounding would decide whose ramps hold, so the ramps are returned, too.
+fn surface_in_cells(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, first: vec3f, last: vec3f) -> Surface {
+    var found = Surface(NO_SURFACE, Table());
     let way = last - first;
     var share = start;
     while share < end {
@@ -90,11 +97,12 @@ fn surface_in_cells(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, f
         // A border that rounding has not quite passed must not hold the ray up.
         let next = min(max(share + min(min(steps.x, steps.y), steps.z), share + 1e-6), end);
         let ramps = ramps_of(seen_channel.number, index_of(nearest_voxel(mix(first, last, 0.5 * (share + next)))));
-        let surface = surface_between(near, far, alpha, share, next, table_of(ramps));
-        if surface != NO_SURFACE {
-            return surface;
+        found.table = table_of(ramps);
+        found.share = surface_between(near, far, alpha, share, next, found.table);
+        if found.share != NO_SURFACE {
+            return found;
         }
         share = next;
     }
-    return NO_SURFACE;
+    return found;
 }

@@ -265,20 +265,20 @@ fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
         let far = segment.near + segment.width;
         let start = max(slab.ray.x - segment.near, 0.0) / segment.width;
         let end = 1.0 - max(far - slab.ray.y, 0.0) / segment.width;
-        var share = NO_SURFACE;
+        var found = Surface(NO_SURFACE, seen_table);
         if start < end {
             if LABELS {
                 let first = voxel_at(slab.at, segment.near);
-                share = surface_in_cells(segment.first, segment.last, alpha, start, end, first, voxel_at(slab.at, far));
+                found = surface_in_cells(segment.first, segment.last, alpha, start, end, first, voxel_at(slab.at, far));
             } else {
-                share = surface_between(segment.first, segment.last, alpha, start, end, seen_table);
+                found.share = surface_between(segment.first, segment.last, alpha, start, end, seen_table);
             }
         }
-        if share != NO_SURFACE {
-            let sheet_depth = segment.near + share * segment.width;
-            let table = table_at(slab.at, sheet_depth, 0.0);
-            let gradient = gradient_between(segment.first, segment.last, share);
-            let color = colored(color_at(table, mix(segment.first.x, segment.last.x, share)), slab.own);
+        if found.share != NO_SURFACE {
+            let sheet_depth = segment.near + found.share * segment.width;
+            let gradient = gradient_between(segment.first, segment.last, found.share);
+            let number = mix(segment.first.x, segment.last.x, found.share);
+            let color = colored(color_at(found.table, number), slab.own);
             return Composited(vec4f(shade(color.rgb, gradient, light), 1.0), vec4u(), vec4f(), sheet_depth, true);
         }
     }

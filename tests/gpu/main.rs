@@ -24,6 +24,7 @@ mod memory;
 mod minified;
 mod modes;
 mod properties;
+mod random;
 mod rasterizers;
 mod ray_march;
 mod scenes;

@@ -1,0 +1,82 @@
+//! Random scenes over every key's range, by quads, against the f64 evaluation, and with culling against without.
+
+use sheetsplat::headless::GpuHeadless;
+use sheetsplat::image::Image;
+use sheetsplat::scene::Scene;
+use sheetsplat::settings::{FootprintBox, Method, Rasterizer, Splatting};
+
+use crate::common::cases::cases;
+use crate::common::devices::gpu;
+use crate::common::random_scene::Case;
+use crate::common::tally::{Tally, evaluate, required};
+
+/// The dB that SPEC §12 asks of a GPU's images. After splatting with the kernel's gradient it asks less of all backends.
+const REQUIRED: f64 = 60.0;
+
+/// Scenes whose seeds differ by this have other styles.
+const SEEDS_PER_STYLE: u64 = 1000;
+
+/// The image of a case, or nothing where tiles refuse it, because they would take too long for one dispatch.
+fn draw(gpu: &GpuHeadless, case: &Case, rasterizer: Rasterizer) -> Option<Image> {
+    let splatting = Splatting { rasterizer, ..case.scene.splatting };
+    let scene = Scene { splatting, ..case.scene.clone() };
+    match gpu.render_volume(case.volume.clone(), &scene) {
+        Ok(rendering) => Some(rendering.image),
+        Err(error) => {
+            let text = error.to_string();
+            let is_too_long = rasterizer == Rasterizer::Tiles && text.contains("passes through loops");
+            assert!(is_too_long, "{text}: {}", case.describe());
+            None
+        }
+    }
+}
+
+fn check(tally: &mut Tally, mut case: Case, rasterizer: Rasterizer) -> bool {
+    let (gpu, by) = (gpu(), format!("{rasterizer:?}"));
+    case.scene.splatting.culling = false;
+    let Some(whole) = draw(gpu, &case, rasterizer) else { return false };
+    tally.compare(&case, (&evaluate(&case), &whole), required(&case.scene).min(REQUIRED), &by);
+    case.scene.splatting.culling = true;
+    if let Some(culled) = draw(gpu, &case, rasterizer) {
+        tally.compare_culled(&case, (&whole, &culled), &by);
+    }
+    true
+}
+
+/// Whether a rasterizer draws scenes of a style: parallelograms are drawn by tiles alone, and every sample by quads alone.
+fn draws(rasterizer: Rasterizer, style: u64) -> bool {
+    let splatting = Case::new(style, SEEDS_PER_STYLE * style).scene.splatting;
+    match rasterizer {
+        Rasterizer::Tiles => splatting.method != Method::CompositeEverySample,
+        _ => splatting.footprint_box != FootprintBox::Parallelogram,
+    }
+}
+
+/// Draws some scenes of each style. A style's first scenes compile most of its pipelines.
+fn check_styles(rasterizer: Rasterizer, styles: usize, seeds: usize) {
+    let (mut tally, mut refused) = (Tally::new(), 0);
+    for style in (0..).filter(|&style| draws(rasterizer, style)).take(styles) {
+        for seed in 0..seeds as u64 {
+            let case = Case::new(style, SEEDS_PER_STYLE * style + seed);
+            refused += usize::from(!check(&mut tally, case, rasterizer));
+        }
+    }
+    println!("{rasterizer:?}: {styles} styles of {seeds} seeds, {refused} scenes refused");
+    tally.finish();
+    assert!(refused * 4 <= styles * seeds, "{refused} scenes are refused");
+}
+
+#[test]
+fn random_scenes_by_quads_are_the_twins() {
+    check_styles(Rasterizer::Quads, cases(3, 100), cases(40, 30));
+}
+
+/// Many surfaces lie on the border of two cells, where rounding must not decide whose table colours them.
+#[test]
+fn surfaces_at_borders_of_cells_have_their_own_tables() {
+    for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
+        let mut tally = Tally::new();
+        assert!(check(&mut tally, Case::new(7, 7004), rasterizer), "{rasterizer:?} draws it");
+        tally.finish();
+    }
+}
