@@ -340,7 +340,7 @@ fn holes_and_labels_against_the_twin() {
 fn culling_keeps_its_guarantee() {
     let mut random = Random(2001);
     let mut culled = 0;
-    for case in 0..60 {
+    for case in 0..80 {
         let (volume, mut scene) = random_after(&mut random);
         scene.splatting.slab_profile = [SlabProfile::Linear, SlabProfile::Cubic][case % 2];
         let [with, without] = [true, false].map(|culling| {
