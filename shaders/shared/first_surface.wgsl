@@ -12,7 +12,10 @@
 // The share of the way that stands for no surface.
 const NO_SURFACE = 2.0;
 
-// The number of points tested in a cell, over which the opacity is linear, if the gradient's opacity is not constant.
+// The number of segments of a slab, along each of which numbers run linearly: 2 by the cubic profile.
+override SEGMENTS: u32 = 1u;
+
+// The number of points tested in a cell, over which the opacity is linear, if the gradient's opacity is not constant: segments share them.
 const SAMPLES = 32u;
 
 // The number of bisections between two tested points; more would not change an f32.
@@ -41,7 +44,7 @@ fn surface_between(near: vec4f, far: vec4f, alpha: f32, start: f32, end: f32, ta
         return NO_SURFACE;
     }
     let cells = cells_of(table);
-    let samples = select(SAMPLES, 1u, table.ramps.w - table.ramps.z <= 1u);
+    let samples = select(SAMPLES / SEGMENTS, 1u, table.ramps.w - table.ramps.z <= 1u);
     let size = last - first;
     let is_rising = size >= 0.0;
     let last_cell = cell_of(table, last);

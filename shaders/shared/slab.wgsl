@@ -15,9 +15,6 @@
 // #import shared/shading
 // #import shared/slab_integral
 
-// The number of segments of a slab, along each of which numbers run linearly: 2 by the cubic profile.
-override SEGMENTS: u32 = 1u;
-
 // What pixels carry from plane to plane, as bits: for every channel a record of each pixel, then for every channel whose voxels have colours of their own.
 // A channel's record: the number on the previous plane, and there its gradient in numbers per `unit`. For `maximum` and `minimum` the gradient is packed
 // and followed by the number chosen so far; for `average` the sum and the count of the numbers so far are in its place. A record of colours: the

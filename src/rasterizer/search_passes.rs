@@ -21,8 +21,8 @@ pub(super) fn of(request: &FrameRequest, by_label: bool) -> u32 {
 /// The passes of a slab's second half, and those to find whether the slab shows anything: two more integrals, each with two searches, and their loops.
 const PASSES_OF_HALVES: u32 = 16;
 
-/// The number of points that are tested for a surface in a cell of a table: `SAMPLES` of `shaders/shared/first_surface.wgsl` and one more, or its two ends.
-const TESTED_POINTS: [u32; 2] = [2, 33];
+/// The number of points that are tested for a surface in a cell of a table, but for one more: `SAMPLES` of `shaders/shared/first_surface.wgsl`.
+const SAMPLES: u32 = 32;
 
 /// The number of bisections between two of them: `F32_HALVINGS` there.
 const HALVINGS: u32 = 24;
@@ -33,18 +33,18 @@ fn surface_passes(request: &FrameRequest, after: &After, by_label: bool) -> u32 
     let is_graded = points > 1;
     // Every test may look up the gradient's opacity.
     let of_test = 1 + if is_graded { 3 + of_search(points) } else { 2 };
-    let tested = TESTED_POINTS[usize::from(is_graded)];
+    let of_profile = request.splatting.segments();
+    let tested = 1 + if is_graded { SAMPLES / of_profile } else { 1 };
     let cells = request.ramps.cells();
     let of_cells = |segments: u32| {
         segments * (cells * (4 + tested * of_test) + 2 * (2 + of_search(cells.max(1)))) + HALVINGS * of_test
     };
-    let segments = request.splatting.segments();
     if !by_label {
-        return of_cells(segments);
+        return of_cells(of_profile);
     }
     // Where each voxel has its own table, the way through its cell is searched by itself, and so is each part of one that lies in two segments.
     let borders = after.planes.slab_step(&request.view).to_array().map(|step| step as u32 + 2);
-    (borders.iter().sum::<u32>() + segments - 1).saturating_mul(1 + of_cells(1))
+    (borders.iter().sum::<u32>() + of_profile - 1).saturating_mul(1 + of_cells(1))
 }
 
 /// The passes through loops of a binary search among `points` control points.

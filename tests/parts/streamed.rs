@@ -131,10 +131,10 @@ fn boxes_of_label_maps_are_the_volume_in_memory() {
         let headless = headless(backend);
         let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
         let store = MemoryStore::new(&volume, UVec3::new(8, 12, 10));
-        let drawn = headless.render_volume(streamed(&volume, store, 1 << 18), &scene).unwrap();
+        let drawn = headless.render_volume(streamed(&volume, store, 1 << 19), &scene).unwrap();
         let background = scene.image.background.map(|channel| channel as f32);
         assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, background, 500), 100.0, format!("{backend}"));
-        assert!(drawn.stats.store.unwrap().chunk_bytes < 1 << 18);
+        assert!(drawn.stats.store.unwrap().chunk_bytes < 1 << 19);
     }
 }
 

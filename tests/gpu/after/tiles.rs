@@ -4,7 +4,7 @@ use glam::DVec3;
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{Classification, Compositing, Gradient, Projection, Ramp, Rasterizer};
+use sheetsplat::settings::{Classification, Compositing, Gradient, Projection, Ramp, Rasterizer, SlabProfile};
 use sheetsplat::volume::Volume;
 
 use crate::common::cases::cases;
@@ -63,6 +63,8 @@ fn compare(seed: u64, has_eye: bool, least: f64, change: impl Fn(&mut Random, &m
         for attempt in 0.. {
             let (mut volume, mut scene) = random_case(&mut random, has_eye);
             scene.splatting.compositing = compositing;
+            // A cubic slab is empty or bent by whether its ends reach an opacity, which rounding decides here and there: `random` leaves such pixels out.
+            scene.splatting.slab_profile = SlabProfile::Linear;
             change(&mut random, &mut volume, &mut scene);
             let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
             // A picture that is nearly empty tests nothing.
