@@ -9,6 +9,7 @@
 // #import shared/cells
 // #import shared/channels
 // #import shared/cut
+// #import shared/first_surface
 // #import shared/frame
 // #import shared/means
 // #import shared/planes
