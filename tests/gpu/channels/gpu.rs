@@ -6,7 +6,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::headless::{Backend, GpuHeadless};
 use sheetsplat::scene::TransferSettings;
 use sheetsplat::settings::{
-    Classification, Compositing, Gradient, Interpolation, LabelTables, Order, Ramp, Rasterizer, Splatting,
+    Classification, Compositing, Gradient, Interpolation, LabelTables, Order, Ramp, Rasterizer, SlabProfile, Splatting,
 };
 use sheetsplat::volume::{Labels, Volume};
 use sheetsplat::wgpu::{Features, Limits, TextureFormat};
@@ -452,6 +452,8 @@ fn memory_grows_with_the_channels() {
             let (volume, mut scene) = first_channels(volume, &scene, count);
             (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
             scene.splatting.rasterizer = rasterizer;
+            // The halves of cubic slabs are sheets of all channels, which tiles keep until the last channel's.
+            scene.splatting.slab_profile = SlabProfile::Linear;
             gpu.render_volume(volume, &scene).unwrap().stats.gpu_bytes
         };
         let alone: Vec<u64> = channels.iter().map(|channel| used_by(channel, 1)).collect();
