@@ -15,7 +15,8 @@ use crate::settings::splatting::Classification;
 use crate::settings::window::Region;
 use crate::stats::StoreCounts;
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-use crate::volume::{Grid, MEMBERSHIP_REACH, StreamedVolume, Volume};
+use crate::volume::Grid;
+use crate::volume::{MEMBERSHIP_REACH, StreamedVolume, Volume};
 
 /// The part of the memory that the values of a box may take, as backends hold them several times, and that decoded chunks may take.
 const SHARE: u64 = 4;
