@@ -52,7 +52,7 @@ fn membership_place(directory: u32, voxel: vec3u) -> u32 {
     let at = voxel % MEMBERSHIP_SIDE;
     let slot = at.x + MEMBERSHIP_SIDE * (at.y + MEMBERSHIP_SIDE * at.z);
     let bits = membership_word(record + slot / 32u);
-    if (bits >> (slot % 32u) & 1u) == 0u {
+    if ((bits >> (slot % 32u)) & 1u) == 0u {
         return 0u;
     }
     var before = countOneBits(bits & ((1u << (slot % 32u)) - 1u));
