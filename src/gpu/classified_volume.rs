@@ -11,7 +11,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::brick_lists::{BrickLists, SettledBricks};
 use crate::gpu::counts::{GroupSlabs, Totals};
 use crate::gpu::gpu_volume::GpuVolume;
-use crate::gpu::membership;
+use crate::gpu::membership::{self, Shaded};
 use crate::gpu::ramps::Stored;
 use crate::gpu::shown_bricks::{BrickNeeds, ShownBricks, opaque_values};
 use crate::gpu::volume_texture::{OwnColors, Pages, VolumeTexture};
@@ -201,12 +201,7 @@ impl ClassifiedVolume {
         if self.needs_labels() {
             self.volume.upload_labels(device, queue)?;
         }
-        self.membership = match membership::shaded(self.volume(), &self.transfer) {
-            Some(shaded) if self.classification == Classification::Before => {
-                Some(self.volume.membership(queue, &shaded)?)
-            }
-            _ => None,
-        };
+        self.membership = self.members().map(|shaded| self.volume.membership(queue, &shaded)).transpose()?;
         self.lists.iter_mut().for_each(|list| list.flush(device, queue));
         Ok(())
     }
@@ -244,6 +239,12 @@ impl ClassifiedVolume {
     /// The labels of all channels on the GPU, if shading a layer needs them.
     pub(crate) fn labels(&self, layer: &Layer) -> Option<&TextureView> {
         self.volume.labels().filter(|_| self.shades_by_label(layer))
+    }
+
+    /// The voxels of each channel that have normals of the membership of their labels, if any voxel has.
+    fn members(&self) -> Option<Vec<Shaded>> {
+        let members = membership::shaded(self.volume(), &self.transfer);
+        members.filter(|_| self.classification == Classification::Before)
     }
 
     /// The gradients of the membership of labels on the GPU, if voxels are shaded by them.
@@ -410,7 +411,9 @@ impl ClassifiedVolume {
     pub(crate) fn estimate(&self) -> Result<u64, RenderError> {
         let [values, both] = self.volume.needs()?;
         let has_labels = self.needs_labels() || self.volume.labels().is_some();
-        Ok(if has_labels { both } else { values })
+        let limits = self.volume.device().limits();
+        let membership = self.members().map(|shaded| membership::estimate(&limits, self.volume(), &shaded));
+        Ok(membership.transpose()?.unwrap_or(0) + if has_labels { both } else { values })
     }
 
     /// Bytes of GPU memory, including the volume's, which other views may share ([`GpuVolume::gpu_bytes`]).

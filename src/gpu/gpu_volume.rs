@@ -257,7 +257,7 @@ impl GpuVolume {
         self.shared.membership.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The gradients of membership for what is shaded by them, uploaded at the first request. Those of the previous one are dropped.
+    /// The gradients of membership for what is shaded by them, uploaded at the first request. The gradients of the previous request are dropped.
     ///
     /// # Errors
     /// If they need more layers than the device's textures have, or the device fails.

@@ -4,10 +4,10 @@
 use std::collections::BTreeSet;
 
 use glam::{DVec3, UVec3};
-use wgpu::{Device, Queue};
+use wgpu::{Device, Limits, Queue};
 
 use crate::error::RenderError;
-use crate::gpu::volume_texture::VolumeTexture;
+use crate::gpu::volume_texture::{ValueFormat, VolumeTexture};
 use crate::parallel::prelude::*;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Grid, Members, Volume};
@@ -19,14 +19,14 @@ const MASK: usize = 16;
 /// The words for each channel before all others: where its directory begins, or 0, and whether its labels lie beside its values.
 const HEADER: usize = 2;
 
-/// The voxels of a channel whose normals are of their label's membership.
+/// The voxels of a channel that have normals of their label's membership.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Shaded {
-    /// None.
+    /// No voxel.
     Nothing,
-    /// All: the values are the labels.
+    /// Every voxel: the values are the labels.
     LabelMap,
-    /// Those of some labels of a segmented volume.
+    /// The voxels of some labels of a segmented volume.
     Labels(BTreeSet<u16>),
 }
 
@@ -42,7 +42,7 @@ impl Shaded {
     }
 }
 
-/// Those of all channels, if any has such voxels.
+/// The voxels of each channel that have such normals, if any voxel has.
 pub(crate) fn shaded(volume: &Volume, transfer: &TransferFunction) -> Option<Vec<Shaded>> {
     let channels: Vec<Shaded> = volume.channels().zip(transfer.channels()).map(Shaded::of).collect();
     channels.iter().any(|shaded| *shaded != Shaded::Nothing).then_some(channels)
@@ -62,13 +62,23 @@ pub(crate) fn upload(
     VolumeTexture::upload_words(device, queue, named, &words(volume, shaded))
 }
 
+/// The bytes that [`upload`] will take.
+///
+/// # Errors
+/// As for [`upload`].
+pub(crate) fn estimate(limits: &Limits, volume: &Volume, shaded: &[Shaded]) -> Result<u64, RenderError> {
+    let [bytes, _] = VolumeTexture::estimate(limits, words(volume, shaded).len() as u64, ValueFormat::Bits)?;
+    Ok(bytes)
+}
+
 /// The header, then for each channel the place of every block's record, or 0, and these: a mask of the voxels that have gradients, and half of these gradients, in
 /// membership per `unit`.
 fn words(volume: &Volume, shaded: &[Shaded]) -> Vec<u32> {
     let mut words = vec![0; HEADER * shaded.len()];
-    for (number, (channel, shaded)) in
-        volume.channels().zip(shaded).enumerate().filter(|(_, (_, of))| **of != Shaded::Nothing)
-    {
+    for (number, (channel, shaded)) in volume.channels().zip(shaded).enumerate() {
+        if *shaded == Shaded::Nothing {
+            continue;
+        }
         let directory = words.len();
         words[HEADER * number] = directory as u32;
         words[HEADER * number + 1] = u32::from(*shaded != Shaded::LabelMap);

@@ -126,7 +126,11 @@ impl Scene {
                 false => Channel { visible: settings.visible, ..Channel::new(VolumeSource::Memory) },
             };
             let name = settings.name.or_else(|| channel.channel_name().map(str::to_owned));
-            Channel { name, transfer: self.transfer_of(number, volume, channel).into(), ..settings }
+            // The preset that declares values to be labels stays, because their looks may not tell.
+            let preset =
+                settings.transfer.preset.filter(|preset| *preset == Preset::Labels && channel.labels().is_none());
+            let transfer = TransferSettings { preset, ..self.transfer_of(number, volume, channel).into() };
+            Channel { name, transfer, ..settings }
         };
         (0..).zip(volume.channels()).map(channel).collect()
     }

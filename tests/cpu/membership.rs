@@ -163,6 +163,27 @@ fn label_maps_have_them_by_default() {
     assert_eq!(open.explicit(&head).shading.gradient, Gradient::Differences);
 }
 
+/// A mask does not look like labels, so that only the preset says that it is one: also in a scene with everything stated, and in one that was saved.
+#[test]
+fn masks_are_label_maps_by_their_preset() {
+    let dims = UVec3::splat(24);
+    let grid = sheetsplat::volume::Grid::new(dims, DVec3::ONE);
+    let in_ball = ball(DVec3::splat(11.0), 8.0);
+    let values: Vec<u8> = (0..dims.element_product()).map(|index| u8::from(in_ball(grid.voxel_at(index)))).collect();
+    let mask = Volume::from_values("mask", dims, DVec3::ONE, values).unwrap();
+    let memory = || sheetsplat::scene::VolumeSource::Memory;
+    let scene =
+        Scene::from_volume(memory(), &["preset=labels", "image.width=40", "image.height=40"].map(str::to_owned));
+    let scene = scene.unwrap();
+    assert!(scene.resolve(&mask).membership);
+    let picture = bits(&draw(&mask, &scene).image);
+    let explicit = scene.explicit(&mask);
+    assert_eq!(bits(&draw(&mask, &explicit).image), picture, "everything stated");
+    let text = explicit.to_toml(std::path::Path::new("")).unwrap();
+    let saved = Scene::parse_for(memory(), &text, "saved", std::path::Path::new(""), &[]).unwrap();
+    assert_eq!(bits(&draw(&mask, &saved).image), picture, "saved: {text}");
+}
+
 #[test]
 fn what_has_no_labels_is_refused() {
     let head = builtin::volume("head:24").unwrap();

@@ -45,6 +45,24 @@ fn frames_of_label_maps_are_the_twins() {
     check("every sample", &volume, &scene);
 }
 
+/// The gradients count in what a frame takes.
+#[test]
+fn memory_is_estimated() {
+    let mut random = Random(94);
+    let own = LabelTables { membership: true, ..LabelTables::default() };
+    let mut scene = scene_of_labels(&mut random);
+    for (name, volume) in [("a label map", label_map(&mut random)), ("a segmented volume", segmented(&mut random))] {
+        if volume.labels().is_some() {
+            scene.shading.gradient = Gradient::Differences;
+            scene.transfer.labels = [(1, own.clone())].into();
+        }
+        let mut view = gpu().view(volume, &scene).unwrap();
+        let estimated = gpu().renderer().estimate(&view).unwrap();
+        gpu().draw(&mut view).unwrap();
+        assert_eq!(view.gpu_bytes(), estimated, "{name}");
+    }
+}
+
 /// Of labels beside values some have their own normals, others those of the values.
 #[test]
 fn frames_of_segmented_volumes_are_the_twins() {

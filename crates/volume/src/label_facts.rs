@@ -1,8 +1,8 @@
-//! What has been found out about values that may be labels, which takes a look at all of them.
+//! Facts about values that may be labels. Each takes a look at all values, so that a volume keeps it.
 
 use std::sync::{Arc, OnceLock};
 
-/// Shared by a volume's clones, whose values are the same.
+/// The facts that are known of a volume. Its clones share them, since their values are the same.
 #[derive(Clone, Debug, Default)]
 pub struct LabelFacts(Arc<Found>);
 
@@ -18,13 +18,13 @@ impl LabelFacts {
         known(&self.0.counts, count).as_deref()
     }
 
-    /// Whether they lie in regions with sharp borders. `look` looks at the first call.
+    /// Whether the labels lie in regions with sharp borders. `look` finds out at the first call.
     pub fn has_sharp_borders(&self, look: impl FnOnce() -> bool) -> bool {
         *known(&self.0.has_sharp_borders, look)
     }
 }
 
-/// A fact, found out if it is not known. No thread waits for another's, because one that looks by a pool of threads may be given the task that waits for it.
+/// A fact, found out if it is not known. No thread waits for another: a thread that looks with the help of a pool may be given the very task that waits.
 fn known<T>(fact: &OnceLock<T>, find: impl FnOnce() -> T) -> &T {
     fact.get().unwrap_or_else(|| {
         let found = find();

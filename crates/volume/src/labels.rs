@@ -188,7 +188,7 @@ impl Volume {
         Self { is_label_map: true, ..self }
     }
 
-    /// What has been found out about its values as labels.
+    /// The facts that are known of its values as labels.
     #[doc(hidden)]
     pub fn label_facts(&self) -> &LabelFacts {
         &self.label_facts

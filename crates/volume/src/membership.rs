@@ -37,7 +37,7 @@ pub(super) struct KeptMembership(Arc<OnceLock<Membership>>);
 pub enum Members {
     /// Its values: a label map.
     OfValues,
-    /// Those beside its values: a segmented volume.
+    /// The labels beside its values: a segmented volume.
     OfLabels,
 }
 
@@ -125,7 +125,7 @@ struct Taps {
 }
 
 impl Taps {
-    /// Those of a voxel, given by its place among `count`.
+    /// The weights of the window around a voxel, given by its place among `count` voxels along the axis.
     fn new(at: usize, count: usize) -> Self {
         let offsets: [f64; TAPS] = std::array::from_fn(|tap| tap as f64 - REACH as f64);
         let is_inside = |tap: usize| (REACH..count + REACH).contains(&(at + tap));
@@ -141,9 +141,9 @@ impl Taps {
         Self { mean: weights.map(|weight| weight / total), slope: std::array::from_fn(slope) }
     }
 
-    /// Those of a block's voxels along an axis.
+    /// The weights for each of a block's voxels along an axis of `count` voxels.
     fn of_block(first: u32, count: u32) -> [Self; SIDE] {
-        // Those beyond the border are not asked for.
+        // A block may reach beyond the border, where no voxel is asked for.
         std::array::from_fn(|at| Self::new((first as usize + at).min(count as usize - 1), count as usize))
     }
 }
@@ -183,7 +183,7 @@ fn centre(slot: usize) -> usize {
     x + REACH + SPAN * (y + REACH + SPAN * (z + REACH))
 }
 
-/// The first place within the border of those that bear on a block, and the one behind the last.
+/// The places within the border among all that bear on a block: the first, and the one behind the last.
 fn inside(grid: &Grid, first: UVec3) -> [UVec3; 2] {
     let reach = UVec3::splat(MEMBERSHIP_REACH);
     [reach.saturating_sub(first), (grid.dims + reach - first).min(UVec3::splat(SPAN as u32))]
@@ -207,7 +207,7 @@ fn around(label: &impl Fn(usize) -> f32, grid: &Grid, first: UVec3) -> Vec<f32> 
 /// Numbers of a row of a block's voxels.
 type Row = [f64; SIDE];
 
-/// A row with the products of other numbers and a weight added.
+/// Adds the products of numbers and a weight to a row.
 fn add(row: &mut Row, weight: f64, numbers: &Row) {
     row.iter_mut().zip(numbers).for_each(|(sum, number)| *sum += weight * number);
 }
@@ -216,7 +216,7 @@ fn add(row: &mut Row, weight: f64, numbers: &Row) {
 /// sums go axis after axis, each over its taps in order: a voxel's are the same in any block.
 fn slopes(labels: &[f32], label: f32, [along_x, along_y, along_z]: &[[Taps; SIDE]; 3]) -> [[Row; 3]; SIDE * SIDE] {
     const NONE: Row = [0.0; SIDE];
-    // Of the rows of all layers: the mean along x, and the slope.
+    // First along x: every row's mean of the membership, and its slope.
     let (mut mean, mut slope) = ([NONE; SPAN * SPAN], [NONE; SPAN * SPAN]);
     for ((labels, mean), slope) in labels.chunks_exact(SPAN).zip(&mut mean).zip(&mut slope) {
         let shares: [f64; SPAN] = std::array::from_fn(|x| f64::from(u8::from(labels[x] == label)));
@@ -229,7 +229,7 @@ fn slopes(labels: &[f32], label: f32, [along_x, along_y, along_z]: &[[Taps; SIDE
             }
         }
     }
-    // Of the block's rows in all layers: the mean along y of the slope along x, the slope of the mean, and the mean of the mean.
+    // Then along y: the mean of slopes along x, the slope of means, and the mean of means.
     let mut of_layers = [[NONE; 3]; SIDE * SPAN];
     for (at, sums) in of_layers.iter_mut().enumerate() {
         let (y, layer) = (at % SIDE, at / SIDE);
@@ -240,6 +240,7 @@ fn slopes(labels: &[f32], label: f32, [along_x, along_y, along_z]: &[[Taps; SIDE
             add(&mut sums[2], along_y[y].mean[tap], &mean[row]);
         }
     }
+    // Last along z: the means of both slopes, and the slope of means.
     let mut slopes = [[NONE; 3]; SIDE * SIDE];
     for (at, sums) in slopes.iter_mut().enumerate() {
         let (y, z) = (at % SIDE, at / SIDE);

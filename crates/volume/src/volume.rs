@@ -61,7 +61,7 @@ pub struct Volume {
     /// Not part of the volume itself; clones share them, since their values are the same.
     pub(super) coefficients: KeptCoefficients,
     pub(super) label_facts: LabelFacts,
-    /// Those of its values and of its labels, kept as the coefficients are.
+    /// The gradients of membership of its values and of its labels, shared as the coefficients are.
     pub(super) membership: [KeptMembership; 2],
 }
 

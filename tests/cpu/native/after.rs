@@ -338,26 +338,29 @@ fn holes_and_labels_against_the_twin() {
 
 #[test]
 fn culling_keeps_its_guarantee() {
-    let mut random = Random(2001);
-    let mut culled = 0;
-    for case in 0..80 {
-        let (volume, mut scene) = random_after(&mut random);
-        scene.splatting.slab_profile = [SlabProfile::Linear, SlabProfile::Cubic][case % 2];
-        let [with, without] = [true, false].map(|culling| {
-            scene.splatting.culling = culling;
-            draw(&volume, &scene)
-        });
-        let allowed = 1.0 - scene.splatting.opacity_threshold + ROUNDING;
-        let difference = largest_difference(&with.image, &without.image);
-        assert!(difference <= allowed, "case {case}: {difference} > {allowed} with {scene:?}");
-        let [few, all] = [&with, &without].map(|rendering| rendering.stats.counts.sections_rasterized);
-        assert!(few <= all && all <= with.stats.counts.sections_total, "case {case}: {few}, {all} with {scene:?}");
-        culled += usize::from(few < all);
-        scene.splatting.opacity_threshold = 1.0;
-        scene.splatting.culling = true;
-        assert_eq!(bits(&draw(&volume, &scene).image), bits(&without.image), "case {case}, T = 1, with {scene:?}");
+    // The halves of cubic slabs are opaque a little later.
+    for (slab_profile, least) in [(SlabProfile::Linear, 10), (SlabProfile::Cubic, 8)] {
+        let mut random = Random(2001);
+        let mut culled = 0;
+        for case in 0..40 {
+            let (volume, mut scene) = random_after(&mut random);
+            scene.splatting.slab_profile = slab_profile;
+            let [with, without] = [true, false].map(|culling| {
+                scene.splatting.culling = culling;
+                draw(&volume, &scene)
+            });
+            let allowed = 1.0 - scene.splatting.opacity_threshold + ROUNDING;
+            let difference = largest_difference(&with.image, &without.image);
+            assert!(difference <= allowed, "case {case}: {difference} > {allowed} with {scene:?}");
+            let [few, all] = [&with, &without].map(|rendering| rendering.stats.counts.sections_rasterized);
+            assert!(few <= all && all <= with.stats.counts.sections_total, "case {case}: {few}, {all} with {scene:?}");
+            culled += usize::from(few < all);
+            scene.splatting.opacity_threshold = 1.0;
+            scene.splatting.culling = true;
+            assert_eq!(bits(&draw(&volume, &scene).image), bits(&without.image), "case {case}, T = 1, with {scene:?}");
+        }
+        assert!(culled > least, "{slab_profile:?}: only {culled} cases cull anything");
     }
-    assert!(culled > 15, "only {culled} cases cull anything");
 }
 
 #[test]

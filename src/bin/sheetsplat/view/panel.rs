@@ -60,7 +60,7 @@ pub(super) fn splatting(ui: &mut Ui, splatting: &mut Splatting) {
     );
 }
 
-/// Light and material; which gradient gives normals has an effect only with classification after splatting.
+/// Light, material, and the gradients that a classification has normals of.
 pub(super) fn shading(ui: &mut Ui, shading: &mut Shading, classification: Classification) {
     ui.checkbox(&mut shading.enabled, "shading");
     if !shading.enabled {
