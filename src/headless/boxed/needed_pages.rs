@@ -35,6 +35,13 @@ impl Needed {
         true
     }
 
+    /// All pages, in an order that no hash decides: it decides which of them get slots.
+    pub(super) fn sorted(pages: HashSet<ChannelPage>) -> Vec<ChannelPage> {
+        let mut pages: Vec<ChannelPage> = pages.into_iter().collect();
+        pages.sort_unstable_by_key(|&(channel, at)| (channel, at.to_array()));
+        pages
+    }
+
     /// The first page along each axis, and the number from there to the last one.
     pub(super) fn within(&self) -> Option<(UVec3, UVec3)> {
         self.ends.map(|(low, high)| (low, high - low + 1))

@@ -218,7 +218,7 @@ impl<'a> Pages<'a> {
         self.ahead = further.take(if hides { 0 } else { AHEAD * current_num_threads() }).collect();
         // Slabs may count that show nothing.
         let within = needed.within().or(nearest.filter(|_| self.chunks.counts_all()));
-        let pages = needed.pages.into_iter().collect();
+        let pages = Needed::sorted(needed.pages);
         Ok(Some((slabs.start..end, within.map(|within| Paging { drawn, pages, within }))))
     }
 
@@ -391,7 +391,7 @@ impl<'a> Pages<'a> {
             );
             Some(((channel, page), texels))
         };
-        let texels = needed.into_iter().filter_map(texels).collect();
+        let texels = Needed::sorted(needed).into_iter().filter_map(texels).collect();
         Ok((block, texels))
     }
 
