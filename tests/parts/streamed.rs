@@ -155,7 +155,7 @@ fn pages_are_kept() {
     // A page lies in several windows; those of its voxels that one does not show are not drawn there.
     assert!(2 * listed < 3 * whole, "{listed} {whole}");
     // With few slots pages go and come back.
-    let (few, counts, again, _) = draw(1 << 20);
+    let (few, counts, again, _) = draw(1 << 19);
     assert!(again > 2 * reads, "{again} {reads} {counts:?}");
     assert_at_least(psnr(&few.pixels, &image.pixels, [0.2, 0.4, 0.6, 0.5], 500), 40.0, "few slots");
 }
@@ -281,7 +281,7 @@ fn what_pages_hide_is_not_read() {
     let headless = headless(Backend::Gpu);
     let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
     let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(32)));
-    let drawn = headless.render_volume(store::streamed(store.clone(), 0, &volume, 1 << 20), &scene).unwrap();
+    let drawn = headless.render_volume(store::streamed(store.clone(), 0, &volume, 1 << 19), &scene).unwrap();
     assert_at_least(psnr(&drawn.image.pixels, &whole.pixels, [0.2, 0.4, 0.6, 0.5], 500), 100.0, "wall");
     let read = store.read.lock().unwrap();
     assert!(!read.is_empty() && read.iter().all(|low| low[0] < 64), "{read:?}");
