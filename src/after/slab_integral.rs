@@ -59,9 +59,11 @@ struct Sums {
 
 /// A slab whose mean amount is below this, and whose numbers reach the range of those with an opacity by less than a hair, is told by rounding alone from one
 /// that shows nothing: its middle is not bent. Many volumes have a background of exactly the value at which opacity begins.
+#[cfg(feature = "cpu")]
 pub(crate) const MIN_BENT: f32 = 1e-3;
 
 /// The integral over the widest iso-range of a single value, of which `surface` makes a cell; SPEC §9's mean amount is 0 there.
+#[cfg(feature = "cpu")]
 pub(crate) const SINGLE: f32 = 5e-7;
 
 /// How far beyond all values the middles of cubic slabs may lie, in lengths of the values' range: more than `|∇f0 - ∇f1|·D/8` with the steepest kernel, the widest
