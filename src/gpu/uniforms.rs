@@ -61,7 +61,7 @@ pub fn frame(
         size: view.size,
         amplitude: (view.footprint.amplitude / view.lambda) as f32,
         radius: kernel.radius() as f32,
-        support: kernel.support() as f32,
+        support: scene.splatting.drawn_radius(kernel) as f32,
         falloff: kernel.falloff() as f32,
         slab_width: view.slabs.width as f32,
         reach: view.reach as f32,
@@ -103,7 +103,7 @@ pub fn gather(
     let in_f32 = |numbers: [f64; 4]| numbers.map(|x| x as f32);
     let FootprintMap { footprint_from_pixels, .. } = view.footprint;
     let (x, y) = (footprint_from_pixels.x_axis, footprint_from_pixels.y_axis);
-    let (shear, half_width) = view.footprint.parallelogram(kernel.support());
+    let (shear, half_width) = view.footprint.parallelogram(splatting.drawn_radius(kernel));
     Gather {
         along: bytemuck::cast(kernel.cumulative_polynomial::<16>(1.0).map(|x| x as f32)),
         chord: bytemuck::cast(kernel.cumulative_polynomial::<8>(CHORD_SPAN).map(|x| x as f32)),

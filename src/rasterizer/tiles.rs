@@ -62,7 +62,7 @@ struct Binned {
     covered: Range<f64>,
     /// The slabs that are drawn.
     drawn: Range<i32>,
-    /// The kernel's support, which determines the footprints' boxes.
+    /// The radius within which kernels are drawn, which determines the footprints' boxes.
     support: f64,
     revision: u64,
 }
@@ -226,10 +226,11 @@ impl Binned {
         let FrameRequest { splatting, view, kernel, covered, .. } = request;
         let search = search_passes::of(request, inputs.labels().is_some());
         let (order, planes) = (drawn_order(splatting), request.after.as_ref().map(|after| after.planes));
+        let support = splatting.drawn_radius(kernel);
         let is_current = |old: &Self| {
             old.view == *view
                 && (old.order, old.revision, old.bins.passes.search) == (order, volume.revision, search)
-                && (old.support, &old.covered, old.planes) == (kernel.support(), covered, planes)
+                && (old.support, &old.covered, old.planes) == (support, covered, planes)
                 && old.drawn == drawn(request)
         };
         let joined = match old {
@@ -245,7 +246,7 @@ impl Binned {
             planes,
             covered: covered.clone(),
             drawn: drawn(request),
-            support: kernel.support(),
+            support,
             revision: volume.revision,
         };
         Ok((binned, true))
@@ -396,7 +397,7 @@ fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) 
     let FrameRequest { view, splatting, kernel, covered, after, .. } = request;
     let planes = after.as_ref().map(|after| &after.planes);
     let most_words = binding(limits) / 4;
-    let (order, support) = (drawn_order(splatting), kernel.support());
+    let (order, support) = (drawn_order(splatting), splatting.drawn_radius(kernel));
     let work = Work { search, threads: request.least_lanes, layers: layer_count(request) };
     let of_groups = (covered.clone(), &drawn(request));
     Ok(PatchBins::new(bricks, (view, planes), order, of_groups, support, work, most_words)?)

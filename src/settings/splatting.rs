@@ -268,6 +268,12 @@ impl Splatting {
         Kernel::new(self.radius, self.falloff).min_discrete_response() >= MIN_RESPONSE
     }
 
+    /// The radius within which a kernel is drawn: after splatting all of it, because where the nearest voxels are equal, voxels of the least weights decide the
+    /// direction of a gradient (SPEC §9).
+    pub(crate) fn drawn_radius(&self, kernel: &Kernel) -> f64 {
+        if self.classification == Classification::After { kernel.radius() } else { kernel.support() }
+    }
+
     /// The settings for a volume that is streamed, whose voxels are interpolated as they are.
     pub(crate) fn streamed(self) -> Self {
         let is_auto = self.interpolation == Interpolation::Auto;

@@ -1,9 +1,9 @@
-//! Random scenes over every key's range, by quads, against the f64 evaluation, and with culling against without.
+//! Random scenes over every key's range, by quads and tiles, against the f64 evaluation, and with culling against without.
 
 use sheetsplat::headless::GpuHeadless;
 use sheetsplat::image::Image;
 use sheetsplat::scene::Scene;
-use sheetsplat::settings::{FootprintBox, Method, Rasterizer, Splatting};
+use sheetsplat::settings::{FootprintBox, Method, Projection, Rasterizer, Splatting};
 
 use crate::common::cases::cases;
 use crate::common::devices::gpu;
@@ -69,6 +69,22 @@ fn check_styles(rasterizer: Rasterizer, styles: usize, seeds: usize) {
 #[test]
 fn random_scenes_by_quads_are_the_twins() {
     check_styles(Rasterizer::Quads, cases(3, 100), cases(40, 30));
+}
+
+#[test]
+fn random_scenes_by_tiles_are_the_twins() {
+    check_styles(Rasterizer::Tiles, cases(3, 40), cases(20, 30));
+}
+
+/// The voxels that decide where a gradient points may be those of the least weights.
+#[test]
+fn gradients_of_steep_kernels_reach_as_far_as_the_kernel() {
+    for rasterizer in [Rasterizer::Quads, Rasterizer::Tiles] {
+        let (mut tally, mut case) = (Tally::new(), Case::new(0, 9));
+        case.scene.camera.projection = Projection::Orthographic { height: Some(1000.0) };
+        assert!(check(&mut tally, case, rasterizer), "{rasterizer:?} draws it");
+        tally.finish();
+    }
 }
 
 /// Many surfaces lie on the border of two cells, where rounding must not decide whose table colours them.
