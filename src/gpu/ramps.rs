@@ -39,6 +39,8 @@ pub struct Ramps {
     lengths: [u32; 3],
     /// The maximum number of cells in a table of integrals.
     cells: u32,
+    /// The most steps of a search for a cell.
+    search_steps: u32,
 }
 
 /// Where labels and colours of a channel are stored among those of all channels of a volume.
@@ -82,7 +84,7 @@ impl Ramps {
         let is_alone = stored.len() == 1;
         let only_shades = is_alone && integration.is_none();
         let matter = |tables: &LabelTables| if only_shades { tables.matter_to_shading() } else { tables.matter() };
-        let (mut points, mut cells) = (Vec::new(), 0);
+        let (mut points, mut cells, mut search_steps) = (Vec::new(), 0, 0);
         let (mut mains, mut all, mut labelled) = (Vec::new(), Vec::new(), Vec::new());
         for (number, (transfer, stored)) in transfer.channels().zip(stored).enumerate() {
             let mut append = |points: &mut Vec<[f32; 4]>, label| {
@@ -91,6 +93,7 @@ impl Ramps {
                 if let Some(Integration { splatting, numbers }) = integration {
                     let table = slab_integral::table(&tables, splatting, &numbers[number]);
                     cells = cells.max(table[0][0] as u32);
+                    search_steps = search_steps.max(slab_integral::search_steps(&table));
                     points.extend(table);
                 }
                 all.push(bounds);
@@ -125,7 +128,7 @@ impl Ramps {
         }
         let lengths = [0, 1, 2].map(|ramp| all.iter().map(|ends| ends[ramp + 1] - ends[ramp]).max().unwrap_or(0));
         let [_, ends @ ..] = mains[0];
-        Self { points, ends, channel_table, channels: mains.len() as u32, first_channel, lengths, cells }
+        Self { points, ends, channel_table, channels: mains.len() as u32, first_channel, lengths, cells, search_steps }
     }
 
     /// The maximum number of control points in each ramp, over all labels and channels.
@@ -136,6 +139,11 @@ impl Ramps {
     /// The maximum number of cells in a table of integrals, over all labels and channels; 0 without such tables.
     pub fn cells(&self) -> u32 {
         self.cells
+    }
+
+    /// The most steps of a search for the cell of a number, over all labels and channels.
+    pub fn search_steps(&self) -> u32 {
+        self.search_steps
     }
 }
 

@@ -4,13 +4,12 @@ use crate::rasterizer::request::{After, FrameRequest};
 use crate::settings::splatting::Compositing;
 
 /// Before splatting those to look up a voxel's control points, where all ramps are searched in memory if any is, because threads hold at most one point each; after
-/// splatting those to find a surface in a slab, and those of a slab's halves.
+/// splatting those to search tables in a slab, those of its halves, and those to find a surface.
 pub(super) fn of(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
     if let Some(after) = &request.after {
         let is_surface = request.splatting.compositing == Compositing::Surface;
-        let of_profile = PASSES_OF_HALVES * (request.splatting.segments() - 1);
-        return of_profile + if is_surface { surface_passes(request, after, by_label) } else { 0 };
+        return slab_passes(request) + if is_surface { surface_passes(request, after, by_label) } else { 0 };
     }
     let channels = request.ramps.channels;
     let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.least_lanes);
@@ -18,8 +17,17 @@ pub(super) fn of(request: &FrameRequest, by_label: bool) -> u32 {
     if in_memory { channels * (1 + searches) } else { 0 }
 }
 
-/// The passes of a slab's second half, and those to find whether the slab shows anything: two more integrals, each with two searches, and their loops.
+/// The passes of the loops of a slab's second half, and those to find whether the slab shows anything, without any search.
 const PASSES_OF_HALVES: u32 = 16;
+
+/// The passes of searches in a slab, and of its halves. An integral searches for two cells, and each stretch that is shown for the opacity of a gradient.
+fn slab_passes(request: &FrameRequest) -> u32 {
+    let segments = request.splatting.segments();
+    let integrals = 2 * segments - 1;
+    let [.., points] = request.ramps.lengths();
+    let of_gradient = if points > 1 { 2 + of_search(points) } else { 0 };
+    2 * integrals * request.ramps.search_steps() + segments * of_gradient + PASSES_OF_HALVES * (segments - 1)
+}
 
 /// The number of points that are tested for a surface in a cell of a table, but for one more: `SAMPLES` of `shaders/shared/first_surface.wgsl`.
 const SAMPLES: u32 = 32;

@@ -96,3 +96,11 @@ fn surfaces_at_borders_of_cells_have_their_own_tables() {
         tally.finish();
     }
 }
+
+/// A software driver ends loops that take longer than was counted, and the rest of a patch would be left out.
+#[test]
+fn searches_of_halves_count_as_passes() {
+    let mut tally = Tally::new();
+    assert!(check(&mut tally, Case::new(1, 1005), Rasterizer::Tiles));
+    tally.finish();
+}
