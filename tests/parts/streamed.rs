@@ -115,6 +115,25 @@ fn boxes_by_the_gpu_are_the_volume_in_memory() {
     assert_same(Backend::Gpu, 64, &["splatting.rasterizer=quads", "splatting.classification=after"]);
 }
 
+/// Close to the eye footprints are far wider than kernels, and reach pixels whose rays pass far from the voxel.
+#[test]
+fn footprints_beside_an_eye_in_the_volume_are_drawn() {
+    let [perspective, wide] = ["camera.projection=perspective", "camera.fov_y=80"];
+    let scenes = [
+        &[perspective, wide, "camera.distance=30"][..],
+        &[perspective, wide, "camera.distance=60", "camera.direction=[1,0.2,0.1]", "splatting.rasterizer=quads"],
+    ];
+    for sets in scenes {
+        assert_same(Backend::Gpu, 64, sets);
+        // The box with all of them does not fit into the memory.
+        let (volume, scene) = head(64, sets);
+        let store = MemoryStore::new(&volume, UVec3::new(8, 12, 10));
+        let refused =
+            headless(Backend::Reference).render_volume(streamed(&volume, store, 1 << 20), &scene).unwrap_err();
+        assert!(refused.to_string().contains("volume.level"), "{refused}");
+    }
+}
+
 /// Normals of labels depend on voxels four from their own, and a box may hold too few labels to look like a label map.
 #[test]
 fn boxes_of_label_maps_are_the_volume_in_memory() {

@@ -8,7 +8,10 @@ use super::channel::{ChannelChunks, LevelChunks, VoxelBox};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::plane_geometry::PlaneGeometry;
+#[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+use crate::geometry::view_geometry::Bounds;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::kernel::Kernel;
 use crate::part::{self, Content};
 use crate::scene::Scene;
 use crate::settings::splatting::Classification;
@@ -39,6 +42,8 @@ pub(super) struct Chunks<'a> {
     view: ViewGeometry,
     /// Voxels around a point on a pixel's ray whose kernels reach it.
     half_box: DVec3,
+    /// The kernel's radius where footprints in perspective decide which pixels a voxel reaches: close to the eye they are far wider than the kernel (SPEC §5).
+    footprints: Option<f64>,
     /// Voxels around these: for their gradients, and rounding.
     rim: f64,
     /// The channels that have an opacity.
@@ -72,7 +77,9 @@ impl<'a> Chunks<'a> {
         let channels = channels.into_iter().filter(ChannelChunks::has_opacity).collect();
         let of_gradients = if transfer.has_membership() { MEMBERSHIP_REACH } else { 1 };
         let (half_box, rim) = (geometry.widest_half_box(view), RIM + f64::from(of_gradients));
-        Ok(Self { volume, view: *view, half_box, rim, channels, most_held: 0 })
+        let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+        let footprints = (!is_after && view.perspective.is_some()).then(|| kernel.support());
+        Ok(Self { volume, view: *view, half_box, footprints, rim, channels, most_held: 0 })
     }
 
     /// The first step in which slabs behind a region are drawn front to back: as many as fit into memory with the voxels that they need; `None` if those of
@@ -109,7 +116,17 @@ impl<'a> Chunks<'a> {
         let last = first + DVec2::new(f64::from(region.width), f64::from(region.height)) + 2.0 * PIXELS;
         let near = view.perspective.map_or(f64::NEG_INFINITY, |perspective| view.slabs.origin + perspective.eye.near);
         let depth = |slab: i32, around: f64| (view.slabs.plane(slab) + around * view.slabs.width).max(near);
-        let depths = [depth(slabs.start, -SLABS), depth(slabs.end, SLABS)];
+        let mut depths = [depth(slabs.start, -SLABS), depth(slabs.end, SLABS)];
+        let mut beside = DVec2::ZERO;
+        if let Some(support) = self.footprints {
+            beside = view.half_box(support, depths[0]..depths[1]);
+            // The voxels' own depths, which their places on the screen follow from.
+            depths = [(depths[0] - view.reach).max(near), depths[1] + view.reach];
+        }
+        if !beside.is_finite() {
+            return self.between(depths);
+        }
+        let (first, last) = (first - beside, last + beside);
         let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for depth in depths {
             for (x, y) in [(first.x, first.y), (last.x, first.y), (first.x, last.y), (last.x, last.y)] {
@@ -117,10 +134,40 @@ impl<'a> Chunks<'a> {
                 (low, high) = (low.min(at), high.max(at));
             }
         }
+        self.around(low, high)
+    }
+
+    /// A box of points with the voxels around it, if there are any.
+    fn around(&self, low: DVec3, high: DVec3) -> Option<VoxelBox> {
         let dims = self.volume.grid().dims.as_dvec3();
         let low = (low - self.half_box - self.rim).floor().max(DVec3::ZERO);
         let end = (high + self.half_box + self.rim).ceil().min(dims);
         low.cmplt(end).all().then(|| VoxelBox { low: low.as_uvec3(), end: end.as_uvec3() })
+    }
+
+    /// The smallest box with all voxels between two sheet depths.
+    fn between(&self, depths: [f64; 2]) -> Option<VoxelBox> {
+        let row = self.view.screen_from_voxel[2];
+        let last = (self.volume.grid().dims - 1).as_dvec3();
+        let ends = |axis: usize| {
+            // The depths that the other axes add to an axis' own.
+            let of_others = (0..3).filter(|&other| other != axis).map(|other| row[other] * last[other]);
+            let [least, most] =
+                of_others.fold([row.w; 2], |[low, high], end| [low + end.min(0.0), high + end.max(0.0)]);
+            let places = [(depths[0] - most) / row[axis], (depths[1] - least) / row[axis]];
+            if row[axis] == 0.0 { [0.0, last[axis]] } else { [places[0].min(places[1]), places[0].max(places[1])] }
+        };
+        let [x, y, z] = [0, 1, 2].map(ends);
+        self.around(DVec3::new(x[0], y[0], z[0]), DVec3::new(x[1], y[1], z[1]))
+    }
+
+    /// The pixels that a box of voxels, given by its middle and half its size, may reach, and its sheet depths; `None` before the near plane.
+    #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
+    pub(super) fn bounds(&self, middle: DVec3, half: DVec3) -> Option<Bounds> {
+        let Some(support) = self.footprints else { return self.view.bounds(middle, half + self.half_box) };
+        let bounds = self.view.bounds(middle, half)?;
+        let beside = self.view.half_box(support, bounds.depths.clone());
+        Some(Bounds { low: bounds.low - beside, high: bounds.high + beside, ..bounds })
     }
 
     /// Reads the voxels of a box, in every channel that may show something there; `None` if no channel may.
@@ -195,10 +242,10 @@ impl<'a> Chunks<'a> {
         self.channels.iter()
     }
 
-    /// What a view of the volume is, its grid, and the voxels around a point on a pixel's ray whose kernels reach it.
+    /// What a view of the volume is, and its grid.
     #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
-    pub(super) fn geometry(&self) -> (&ViewGeometry, &Grid, DVec3) {
-        (&self.view, self.volume.grid(), self.half_box)
+    pub(super) fn geometry(&self) -> (&ViewGeometry, &Grid) {
+        (&self.view, self.volume.grid())
     }
 
     /// Whether values without an opacity change pixels.

@@ -297,8 +297,8 @@ impl<'a> Pages<'a> {
 
     /// The first of some slabs in which open pixels may see something of a box of voxels, given by its middle and half its size; at least a slab before it is reached.
     fn first_slab(&self, (middle, half): (DVec3, DVec3), open: &OpenPixels, slabs: &Range<i32>) -> Option<i32> {
-        let (view, _, half_box) = self.chunks.geometry();
-        let bounds = view.bounds(middle, half + half_box + ROUNDING)?;
+        let (view, _) = self.chunks.geometry();
+        let bounds = self.chunks.bounds(middle, half + ROUNDING)?;
         let (depths, slack) = (view.depths(middle, half + ROUNDING), SLABS * view.slabs.width);
         let own = view.slabs.covered(depths.start - slack..depths.end + slack)?;
         let is_in_slabs = own.start < slabs.end && own.end > slabs.start;
