@@ -28,6 +28,7 @@ use crate::part::{self, Content, Part};
 use crate::rendering::Rendering;
 use crate::scene::Scene;
 use crate::scene::open::CHUNKS_OF_THREAD;
+use crate::settings::shading::STREAMED_LIGHT;
 use crate::settings::camera::Camera;
 use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
@@ -278,6 +279,7 @@ fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFun
     scene.check_volume(sample)?;
     check(scene)?;
     scene.check_streamed(volume)?;
+    scene.shading.refuse_light(STREAMED_LIGHT[0], STREAMED_LIGHT[1])?;
     let settled = scene.settled(sample);
     let transfer = settled.resolve(sample);
     Ok((Scene { splatting: settled.splatting.streamed(), ..settled }, transfer))
