@@ -18,7 +18,6 @@ pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
             return refused(key, found.to_string(), format!("at most {MAX_SIZE}"));
         }
     }
-    scene.shading.refuse_light("with the backend \"cpu\"", "0")?;
     let splatting = &scene.splatting;
     let other = "or another backend than \"cpu\"";
     if let Some(economy) = splatting.experimental.in_use() {

@@ -121,7 +121,6 @@ impl FrameRequest {
     ) -> Result<Self, RenderError> {
         let splatting = scene.splatting;
         splatting.check()?;
-        scene.shading.refuse_light("with the backend \"gpu\"", "0, or another backend")?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let stored = volume.stored(layer);

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, DVec4};
 
-use super::shading::{alpha, amount};
+use super::opacity::{alpha, amount};
 use super::{Buffer, Geometry, Section, Splat, sheets, splat};
 use crate::error::RenderError;
 use crate::error::setting::scaled;

@@ -14,6 +14,7 @@ mod host;
 pub mod light;
 pub mod means;
 pub mod membership;
+mod opacity;
 pub mod ray_march;
 pub mod resolve;
 mod section;

@@ -2,8 +2,10 @@
 
 use glam::{DVec3, DVec4};
 
-pub use super::section::Splat;
 use super::light::{Left, Lights};
+use super::opacity::alpha;
+pub use super::opacity::amount;
+pub use super::section::Splat;
 use super::{Geometry, membership};
 use crate::error::RenderError;
 use crate::error::setting::scaled;
@@ -11,9 +13,8 @@ use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::scene::Scene;
 use crate::settings::shading::Light;
-use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::{Members, Volume};
+use crate::volume::Volume;
 
 /// The indices in memory of the voxels that take part, ascending.
 pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {
@@ -83,40 +84,8 @@ pub fn emission(
     channels(volume, transfer).map(of_channel).sum()
 }
 
-/// α of a voxel, times A where it has a colour of its own (SPEC §10); 0 for a hole.
-pub(super) fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
-    let value = f64::from(volume.values().at(index as usize));
-    let tables = transfer.tables(volume.label(index));
-    // Most voxels are excluded by their value, so the gradient is computed only if needed.
-    if value.is_nan() || tables.opacity.at(value) <= 0.0 {
-        return 0.0;
-    }
-    let own = volume.color(index).map_or(1.0, |color| color.w);
-    let voxel = volume.grid().voxel_at(index);
-    let gradient = match tables.members {
-        _ if tables.gradient_opacity.is_none() => DVec3::ZERO,
-        Some(of @ Members::OfValues) => membership::gradient(volume, of, voxel),
-        Some(Members::OfLabels) | None => volume.gradient(voxel),
-    };
-    tables.alpha(value, gradient.length()) * own
-}
-
-/// `m`: the amount per unit length (SPEC §5).
-pub fn amount(compositing: Compositing, alpha: f64) -> f64 {
-    match compositing {
-        Compositing::Exponential => -(-alpha.min(0.9999)).ln_1p(),
-        _ => alpha,
-    }
-}
-
 /// `C` of SPEC §3, with what light sheets leave of the light (SPEC §14).
-pub fn color(
-    Scene { shading, camera, .. }: &Scene,
-    color: DVec3,
-    gradient: DVec3,
-    to_eye: DVec3,
-    left: Left,
-) -> DVec3 {
+pub fn color(Scene { shading, camera, .. }: &Scene, color: DVec3, gradient: DVec3, to_eye: DVec3, left: Left) -> DVec3 {
     if !shading.enabled {
         return color;
     }

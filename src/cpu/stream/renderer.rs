@@ -28,8 +28,8 @@ use crate::part::{self, Content, Part};
 use crate::rendering::Rendering;
 use crate::scene::Scene;
 use crate::scene::open::CHUNKS_OF_THREAD;
-use crate::settings::shading::STREAMED_LIGHT;
 use crate::settings::camera::Camera;
+use crate::settings::shading::STREAMED_LIGHT;
 use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
@@ -165,7 +165,7 @@ impl StreamRenderer {
         let (size, grid) = (view.size, *self.volume.grid());
         let threads = self.threads();
         let stream = Arc::new(self.stream((scene, view), &window)?);
-        let host = Host { window, is_part, first_hit: None, surfaces: None };
+        let host = Host { window, is_part, first_hit: None, surfaces: None, lights: None };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
             Classification::After => {
                 let nothing = Volume::piece(grid.resized(UVec3::ZERO), Values::default());
