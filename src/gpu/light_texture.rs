@@ -3,13 +3,16 @@
 use std::sync::Arc;
 
 use wgpu::{
-    Device, Extent3d, Origin3d, Queue, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect, TextureDescriptor,
-    TextureDimension, TextureFormat, TextureUsages, TextureView,
+    Device, Extent3d, Limits, Origin3d, Queue, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
+    TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
 };
 
 use super::layout::Frame;
 use crate::error::RenderError;
 use crate::light::{LightSheets, Lights};
+
+/// The texels that are written at a time.
+const WRITTEN: usize = 1 << 24;
 
 /// Bytes of a texel.
 const TEXEL: u64 = size_of::<f32>() as u64;
@@ -53,43 +56,57 @@ impl LightTexture {
         }
         let side = sheets.iter().flatten().map(|sheets| sheets.side as u32).max().unwrap_or(1);
         let planes = sheets.iter().flatten().map(|sheets| sheets.planes() as u32).sum::<u32>();
-        let most = device.limits().max_texture_dimension_3d;
-        let largest = side.max(planes);
-        if largest > most {
-            let (required, actual) = (u64::from(largest), u64::from(most));
-            return Err(RenderError::Limit {
-                what: "the light sheets",
-                limit: "max_texture_dimension_3d",
-                required,
-                actual,
-            });
-        }
+        let gpu_bytes = Self::estimate(&device.limits(), [side, planes])?;
         let texture = texture(device, "sheetsplat.light_sheets", [side, side, planes.max(1)]);
         let mut first = 0;
         for sheets in sheets.iter().flatten().filter(|sheets| sheets.planes() > 0) {
             let of_stack = sheets.planes() as u32;
-            queue.write_texture(
-                TexelCopyTextureInfo {
-                    texture: &texture,
-                    mip_level: 0,
-                    origin: Origin3d { x: 0, y: 0, z: first },
-                    aspect: TextureAspect::All,
-                },
-                bytemuck::cast_slice(&sheets.light),
-                TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(side * TEXEL as u32),
-                    rows_per_image: Some(side),
-                },
-                Extent3d { width: side, height: side, depth_or_array_layers: of_stack },
-            );
+            // Some planes at a time, because a device's staging memory is limited.
+            let at_a_time = (WRITTEN / (side as usize * side as usize)).max(1);
+            for (planes, at) in
+                sheets.light.chunks(at_a_time * side as usize * side as usize).zip((first..).step_by(at_a_time))
+            {
+                queue.write_texture(
+                    TexelCopyTextureInfo {
+                        texture: &texture,
+                        mip_level: 0,
+                        origin: Origin3d { x: 0, y: 0, z: at },
+                        aspect: TextureAspect::All,
+                    },
+                    bytemuck::cast_slice(planes),
+                    TexelCopyBufferLayout {
+                        offset: 0,
+                        bytes_per_row: Some(side * TEXEL as u32),
+                        rows_per_image: Some(side),
+                    },
+                    Extent3d {
+                        width: side,
+                        height: side,
+                        depth_or_array_layers: (planes.len() / (side as usize * side as usize)) as u32,
+                    },
+                );
+            }
             first += of_stack;
         }
         Ok(Self {
             view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
             sheets: sheets.map(|sheets| sheets.cloned()),
-            gpu_bytes: u64::from(side) * u64::from(side) * u64::from(planes.max(1)) * TEXEL,
+            gpu_bytes,
         })
+    }
+
+    /// The bytes of a texture for sheets of some pixels along each side and as many planes; 0 without sheets.
+    ///
+    /// # Errors
+    /// If the device's textures are too small.
+    pub(crate) fn estimate(limits: &Limits, [side, planes]: [u32; 2]) -> Result<u64, RenderError> {
+        let (largest, most) = (side.max(planes), limits.max_texture_dimension_3d);
+        if largest > most {
+            let (what, limit) = ("the light sheets", "max_texture_dimension_3d");
+            return Err(RenderError::Limit { what, limit, required: largest.into(), actual: most.into() });
+        }
+        let planes = if side > 0 { planes.max(1) } else { 0 };
+        Ok(u64::from(side) * u64::from(side) * u64::from(planes) * TEXEL)
     }
 
     /// A texture of one texel, for frames without light sheets.

@@ -7,10 +7,14 @@ use web_time::Instant;
 
 use super::lights::Lights;
 use super::matter::LightMatter;
+#[cfg(feature = "gpu")]
+use super::matter::lit_bricks;
 use super::sheets::LightSheets;
 use super::view::LightView;
 use crate::error::RenderError;
 use crate::kernel::Kernel;
+#[cfg(feature = "gpu")]
+use crate::lists::quad_plan::Overlaps;
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
@@ -78,17 +82,13 @@ impl KeptLight {
             }
         };
         let matter = &self.matter.insert(matter).matter;
-        let Shading { occlusion, occlusion_spread, shadow, shadow_spread, light_step: step, light, .. } = scene.shading;
-        let basis = camera.basis();
-        let front = -basis.w;
-        let source = |(amount, spread, to_light): (f64, f64, DVec3)| {
-            let kernel = [scene.splatting.radius, scene.splatting.falloff];
-            (amount > 0.0).then_some(Source { to_light, up: camera.up, spread, step, kernel })
-        };
-        let to_light = light.direction(&basis).unwrap_or(front);
-        let wanted = [(occlusion, occlusion_spread, front), (shadow, shadow_spread, to_light)].map(source);
-        for (kept, wanted) in self.sheets.iter_mut().zip(wanted) {
-            kept.take_if(|(source, _)| Some(*source) != wanted);
+        let Shading { occlusion, shadow, .. } = scene.shading;
+        let wanted = sources(scene, camera);
+        // What nobody else holds any more is memory for new sheets.
+        let mut memory = [Vec::new(), Vec::new()];
+        for ((kept, wanted), memory) in self.sheets.iter_mut().zip(wanted).zip(&mut memory) {
+            let old = kept.take_if(|(source, _)| Some(*source) != wanted);
+            *memory = old.and_then(|(_, sheets)| Arc::into_inner(sheets)).map_or_else(Vec::new, |sheets| sheets.light);
         }
         let is_missing = |number: usize| wanted[number].filter(|_| self.sheets[number].is_none());
         let missing = [is_missing(0), is_missing(1)];
@@ -99,13 +99,14 @@ impl KeptLight {
             // Both take the same amounts.
             [Some(first), Some(second)] if first.to_light == second.to_light => {
                 let variances = [variance(&first), variance(&second)];
-                let [a, b] = LightSheets::new(matter, &view(&first)?, &kernel, variances);
+                let [a, b] = LightSheets::new(matter, &view(&first)?, &kernel, variances, memory);
                 self.sheets = [Some((first, Arc::new(a))), Some((second, Arc::new(b)))];
             }
             missing => {
-                for (kept, source) in self.sheets.iter_mut().zip(missing) {
+                for ((kept, source), memory) in self.sheets.iter_mut().zip(missing).zip(memory) {
                     if let Some(source) = source {
-                        let [sheets] = LightSheets::new(matter, &view(&source)?, &kernel, [variance(&source)]);
+                        let [sheets] =
+                            LightSheets::new(matter, &view(&source)?, &kernel, [variance(&source)], [memory]);
                         *kept = Some((source, Arc::new(sheets)));
                     }
                 }
@@ -119,6 +120,31 @@ impl KeptLight {
         Ok(Some(Arc::new(lights)))
     }
 
+    /// The pixels along each side of the sheets that [`Self::lights`] would give, and the number of planes of both stacks; 0 without occlusion, shadow or
+    /// shading.
+    ///
+    /// # Errors
+    /// As for [`Self::lights`].
+    #[cfg(feature = "gpu")]
+    pub(crate) fn extent(
+        (volume, transfer): (&Volume, &TransferFunction),
+        scene: &Scene,
+        camera: &Camera,
+    ) -> Result<[u32; 2], RenderError> {
+        let wanted = sources(scene, camera);
+        if wanted.iter().flatten().next().is_none() {
+            return Ok([0; 2]);
+        }
+        let bricks = lit_bricks(volume, transfer, &scene.clip);
+        let [mut side, mut planes] = [0; 2];
+        for source in wanted.iter().flatten() {
+            let light = LightView::new(volume.grid(), scene, camera.up, source.to_light)?;
+            let slabs = Overlaps::count(bricks.bricks(), &light.view).slabs.len() as u32;
+            (side, planes) = (light.side as u32, planes + if slabs > 0 { slabs + 1 } else { 0 });
+        }
+        Ok([side, planes])
+    }
+
     /// A frame's statistics with those of its light sheets, if it has any.
     #[cfg(any(feature = "cpu", feature = "gpu"))]
     pub(crate) fn noted_in(&self, stats: Stats) -> Stats {
@@ -129,4 +155,18 @@ impl KeptLight {
         }
         Stats { light_ms: Some(self.milliseconds), light_bytes: Some(bytes), ..stats }
     }
+}
+
+/// What the stacks of occlusion and of shadow depend on, as far as a scene with a framed camera has them.
+fn sources(scene: &Scene, camera: &Camera) -> [Option<Source>; 2] {
+    let Shading { occlusion, occlusion_spread, shadow, shadow_spread, light_step: step, light, .. } = scene.shading;
+    let basis = camera.basis();
+    let front = -basis.w;
+    let source = |(amount, spread, to_light): (f64, f64, DVec3)| {
+        let kernel = [scene.splatting.radius, scene.splatting.falloff];
+        let is_wanted = amount > 0.0 && scene.shading.enabled;
+        is_wanted.then_some(Source { to_light, up: camera.up, spread, step, kernel })
+    };
+    let to_light = light.direction(&basis).unwrap_or(front);
+    [(occlusion, occlusion_spread, front), (shadow, shadow_spread, to_light)].map(source)
 }

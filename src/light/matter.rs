@@ -2,7 +2,7 @@
 
 use glam::UVec3;
 
-use crate::lists::brick::{self, Brick};
+use crate::lists::brick::{self, Brick, BrickList};
 use crate::lists::classify::{brick_list, channels};
 use crate::parallel::prelude::*;
 use crate::settings::clip::Clip;
@@ -12,8 +12,11 @@ use crate::volume::{Grid, Volume};
 /// The opacity beyond which amounts no longer grow (SPEC §5).
 const MAX_ALPHA: f64 = 0.9999;
 
+/// The values whose amounts a thread remembers.
+const KNOWN: usize = 1 << 9;
+
 /// The bricks that a thread looks at at a time.
-const BRICKS: usize = 256;
+const BRICKS: usize = 1024;
 
 /// The voxels that take part and whose centres no cut leaves out, with their amounts per `unit`.
 #[derive(Clone, Debug)]
@@ -28,11 +31,24 @@ pub struct LightMatter {
 impl LightMatter {
     /// That of a volume under a transfer function and cuts.
     pub fn new(volume: &Volume, transfer: &TransferFunction, clip: &Clip) -> Self {
-        // Kernels without extent: their centres decide.
-        let bricks = brick_list(volume, transfer, &clip.voxels(volume.grid(), 0.0)).bricks().to_vec();
+        let bricks = lit_bricks(volume, transfer, clip).bricks().to_vec();
+        let is_by_value = volume.further().is_empty()
+            && volume.labels().is_none()
+            && volume.colors().is_none()
+            && transfer.gradient_opacity.is_none();
         let of_bricks = |bricks: &[Brick]| {
-            let voxels = bricks.iter().flat_map(brick::voxels);
-            voxels.map(|(_, voxel)| amount(volume, transfer, voxel) as f32).collect::<Vec<_>>()
+            // Most volumes have few values.
+            let mut known = [(f32::NAN, 0.0); KNOWN];
+            let of_voxel = |(_, voxel): (u32, UVec3)| {
+                let value = volume.value(voxel);
+                let bits = value.to_bits();
+                let (of, known) = &mut known[(bits ^ bits >> 16) as usize % KNOWN];
+                if !is_by_value || *of != value {
+                    (*of, *known) = (value, amount(volume, transfer, voxel) as f32);
+                }
+                *known
+            };
+            bricks.iter().flat_map(brick::voxels).map(of_voxel).collect::<Vec<_>>()
         };
         let amounts: Vec<Vec<f32>> = bricks.par_chunks(BRICKS).map(of_bricks).collect();
         let next = |sum: &mut u32, brick: &Brick| {
@@ -55,6 +71,12 @@ impl LightMatter {
         });
         slots.zip(self.amounts[self.starts[number] as usize..].iter().copied())
     }
+}
+
+/// The bricks of the voxels that take part and whose centres no cut leaves out.
+pub(super) fn lit_bricks(volume: &Volume, transfer: &TransferFunction, clip: &Clip) -> BrickList {
+    // Kernels without extent: their centres decide.
+    brick_list(volume, transfer, &clip.voxels(volume.grid(), 0.0))
 }
 
 /// `-ln(1 - min(α, 0.9999))` of a voxel, summed over all channels.

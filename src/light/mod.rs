@@ -16,6 +16,7 @@
 mod box_filter;
 mod kept;
 mod lights;
+mod lit;
 mod matter;
 mod profile;
 mod section;

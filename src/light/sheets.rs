@@ -3,15 +3,13 @@
 use glam::{DVec3, DVec4};
 
 use super::box_filter::{Area, BoxFilter};
+use super::lit::Lit;
 use super::matter::LightMatter;
 use super::splat::Splatter;
 use super::view::LightView;
 use crate::kernel::Kernel;
 use crate::lists::quad_plan::Overlaps;
 use crate::parallel::prelude::*;
-
-/// Light that is left out where all of a brick's pixels have less of it.
-const DARK: f32 = 1e-4;
 
 /// The light that each plane gets from one direction.
 #[derive(Clone, Debug)]
@@ -35,12 +33,13 @@ struct Growing {
 }
 
 impl LightSheets {
-    /// The sheets of a view, for each spread given as a variance in pixels² per slab.
+    /// The sheets of a view, for each spread given as a variance in pixels² per slab, in memory that may be used again.
     pub(super) fn new<const N: usize>(
         matter: &LightMatter,
         light: &LightView,
         kernel: &Kernel,
         variances: [f64; N],
+        mut memory: [Vec<f32>; N],
     ) -> [Self; N] {
         let slabs = Overlaps::count(&matter.bricks, &light.view).slabs;
         let ([x, y, plane], side) = (light.place, light.side);
@@ -49,17 +48,20 @@ impl LightSheets {
             return variances.map(|_| Self { rows, side, first: 0, planes: 0, light: Vec::new() });
         }
         let (pixels, count) = (side * side, slabs.len());
-        let mut stacks = variances.map(|variance| Growing {
-            filter: BoxFilter::new(variance),
-            area: Area::NONE,
-            light: vec![1.0; pixels * (count + 1)],
+        let mut number = 0;
+        let mut stacks = variances.map(|variance| {
+            let mut light = std::mem::take(&mut memory[number]);
+            number += 1;
+            light.resize(pixels * (count + 1), 1.0);
+            light.par_chunks_mut(pixels).for_each(|plane| plane.fill(1.0));
+            Growing { filter: BoxFilter::new(variance), area: Area::NONE, light }
         });
         let splatter = Splatter::new(matter, light, kernel, slabs.start);
         let (mut passed, mut along_x) = (vec![1.0; pixels], vec![0.0; pixels]);
         for k in 0..count {
             let planes = stacks.each_ref().map(|stack| &stack.light[k * pixels..(k + 1) * pixels]);
             let lit = Lit::of(&planes, side);
-            let touched = splatter.slab(k, |area| lit.is_dark(area), &mut passed);
+            let touched = splatter.slab(k, &lit, &mut passed);
             for Growing { filter, area, light } in &mut stacks {
                 *area = area.and(touched).grown(filter.reach(), side);
                 if area.is_empty() {
@@ -132,71 +134,5 @@ impl LightSheets {
         };
         let (upper, lower) = (row(top as i64), row(top as i64 + 1));
         upper + (lower - upper) * down
-    }
-}
-
-/// The pixels of a plane that have light, as bits.
-struct Lit {
-    /// The words of a row.
-    across: usize,
-    words: Vec<u64>,
-}
-
-/// The pixels of a word.
-const WORD: usize = u64::BITS as usize;
-
-impl Lit {
-    /// Those of the planes of several stacks, where any of them has light.
-    fn of(planes: &[&[f32]], side: usize) -> Self {
-        let across = side.div_ceil(WORD);
-        let mut words = vec![0; across * side];
-        words.par_chunks_mut(across).enumerate().for_each(|(y, words)| {
-            for plane in planes {
-                for (word, pixels) in words.iter_mut().zip(plane[y * side..(y + 1) * side].chunks(WORD)) {
-                    let bits = pixels.iter().rev().fold(0, |bits, &light| bits << 1 | u64::from(light >= DARK));
-                    *word |= bits;
-                }
-            }
-        });
-        Self { across, words }
-    }
-
-    /// Whether no pixel of an area has light.
-    fn is_dark(&self, Area { low, end }: &Area) -> bool {
-        let [left, right] = [low[0], end[0]];
-        if left >= right {
-            return true;
-        }
-        let (first, last) = (left / WORD, (right - 1) / WORD);
-        let is_lit = |row: usize| {
-            let row = &self.words[row * self.across..][..self.across];
-            (first..=last).any(|word| {
-                let from = u64::MAX << left.saturating_sub(word * WORD).min(WORD - 1);
-                let to = u64::MAX >> (WORD - (right - word * WORD).min(WORD));
-                row[word] & from & to != 0
-            })
-        };
-        !(low[1]..end[1]).any(is_lit)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn areas_are_dark_where_no_pixel_is_lit() {
-        const SIDE: usize = 131;
-        let mut plane = vec![0.0; SIDE * SIDE];
-        let lit = [[0, 0], [63, 5], [64, 70], [130, 130], [127, 9]];
-        lit.iter().for_each(|&[x, y]| plane[x + y * SIDE] = 0.5);
-        let found = Lit::of(&[&plane], SIDE);
-        for low in [[0, 0], [1, 0], [60, 4], [64, 4], [65, 60], [120, 1], [128, 128], [131, 131]] {
-            for size in [[1, 1], [3, 9], [5, 70], [71, 12], [131, 131]] {
-                let end = [0, 1].map(|axis| (low[axis] + size[axis]).min(SIDE));
-                let is_in = |&[x, y]: &[usize; 2]| (low[0]..end[0]).contains(&x) && (low[1]..end[1]).contains(&y);
-                assert_eq!(found.is_dark(&Area { low, end }), !lit.iter().any(is_in), "{low:?} {end:?}");
-            }
-        }
     }
 }

@@ -5,11 +5,12 @@
 use glam::DVec4;
 
 use super::box_filter::Area;
+use super::lit::Lit;
 use super::matter::LightMatter;
 use super::profile::{Profile, least, most, nearest, passed};
 use super::section::Section;
 use super::view::LightView;
-use super::window::Window;
+use super::window::{Places, Window};
 use crate::geometry::slab::SlabGrid;
 use crate::kernel::Kernel;
 use crate::lists::brick::{self, BRICK_VOXELS};
@@ -56,7 +57,7 @@ pub(super) struct Splatter<'a> {
     shape: Shape,
     side: usize,
     /// By slot, from a brick's first one: pixels right, pixels down, slabs.
-    slots: Vec<[f32; 3]>,
+    slots: [[f32; BRICK_VOXELS as usize]; 3],
     /// `1/λ`, times the low-pass rule's amplitude.
     scale: f32,
     /// Grid units along a kernel's ray to a slab's width.
@@ -95,15 +96,15 @@ impl<'a> Splatter<'a> {
             (placed, slabs.touched(depths.start, depths.end))
         };
         let (placed, touched): (Vec<Placed>, Vec<_>) = matter.bricks.par_iter().map(of_brick).unzip();
-        let slot = |slot: u32| {
-            let offset = brick::in_brick(slot).as_dvec3();
-            [x, y, depth].map(|row| row.truncate().dot(offset) as f32)
-        };
+        let slots = [x, y, depth].map(|row| {
+            let offset = |slot: usize| brick::in_brick(slot as u32).as_dvec3();
+            std::array::from_fn(|slot| row.truncate().dot(offset(slot)) as f32)
+        });
         Self {
             matter,
-            shape: Shape::new(light, kernel),
+            shape: Shape::new(light, kernel, slabs.width),
             side,
-            slots: (0..BRICK_VOXELS).map(slot).collect(),
+            slots,
             scale: (view.footprint.amplitude / view.lambda) as f32,
             per_slab: slabs.width as f32,
             reach: (view.reach / slabs.width) as f32,
@@ -114,32 +115,40 @@ impl<'a> Splatter<'a> {
 
     /// The light that passes a slab, counted from the first one, at each pixel; and the pixels at which it is not all. Bricks are left out whose pixels are
     /// dark.
-    pub(super) fn slab(&self, slab: usize, is_dark: impl Fn(&Area) -> bool + Sync, passed: &mut [f32]) -> Area {
+    pub(super) fn slab(&self, slab: usize, lit: &Lit, passed: &mut [f32]) -> Area {
         let range = self.buckets.touching(slab as i32);
         let listed = self.buckets.order[range.start as usize..range.end as usize].par_iter();
-        let shown: Vec<u32> = listed.copied().filter(|&number| !is_dark(&self.placed[number as usize].area)).collect();
+        let shown: Vec<u32> =
+            listed.copied().filter(|&number| !lit.is_dark(&self.placed[number as usize].area)).collect();
         let areas = shown.iter().map(|&number| self.placed[number as usize].area);
         let touched = areas.fold(Area::NONE, Area::and);
-        passed.par_chunks_mut(ROWS * self.side).enumerate().for_each(|(number, passed)| {
-            let first_row = number * ROWS;
-            let end_row = first_row + passed.len() / self.side;
-            let reaches = |&&brick: &&u32| {
-                let Area { low, end } = self.placed[brick as usize].area;
-                low[1] < end_row && end[1] > first_row
-            };
-            let bricks: Vec<u32> = shown.iter().filter(reaches).copied().collect();
+        let windows = match &self.shape {
+            Shape::Small(_) => Some(lit.windows::<4>(self.side)),
+            Shape::Large(_) => Some(lit.windows::<8>(self.side)),
+            Shape::Ellipse(_) => None,
+        };
+        let mut by_band = vec![Vec::new(); self.side.div_ceil(ROWS)];
+        for &brick in &shown {
+            let Area { low, end } = self.placed[brick as usize].area;
+            by_band[low[1] / ROWS..end[1].div_ceil(ROWS)].iter_mut().for_each(|bricks| bricks.push(brick));
+        }
+        let bands = passed.par_chunks_mut(ROWS * self.side).zip(by_band.par_iter()).enumerate();
+        bands.for_each(|(number, (passed, bricks))| {
             if bricks.is_empty() {
                 passed.fill(1.0);
                 return;
             }
-            match &self.shape {
-                Shape::Small(window) => self.draw_windows(window, (slab, first_row), &bricks, passed),
-                Shape::Large(window) => self.draw_windows(window, (slab, first_row), &bricks, passed),
-                Shape::Ellipse(ellipse) => {
+            let first_row = number * ROWS;
+            let within = (slab, first_row);
+            match (&self.shape, &windows) {
+                (Shape::Small(window), Some(lit)) => self.draw_windows(window, within, (bricks, lit), passed),
+                (Shape::Large(window), Some(lit)) => self.draw_windows(window, within, (bricks, lit), passed),
+                (Shape::Ellipse(ellipse), _) => {
                     passed.fill(0.0);
-                    self.sections(slab, first_row, &bricks, |section| ellipse.add(&section, self.side, passed));
+                    self.sections(slab, first_row, bricks, |section| ellipse.add(&section, self.side, passed));
                     passed.iter_mut().for_each(|pixel| *pixel = self::passed(*pixel));
                 }
+                _ => {}
             }
         });
         touched
@@ -152,7 +161,8 @@ impl<'a> Splatter<'a> {
             let [x, y, depth] = self.placed[brick as usize].first;
             let (y, depth) = (y - first_row as f32, depth - slab as f32);
             for (slot, amount) in self.matter.voxels(brick as usize) {
-                let [right, down, behind] = self.slots[slot as usize % BRICK_VOXELS as usize];
+                let slot = slot as usize % BRICK_VOXELS as usize;
+                let [right, down, behind] = self.slots.each_ref().map(|offsets| offsets[slot]);
                 let depth = depth + behind;
                 if depth + self.reach > 0.0 && depth - self.reach < 1.0 {
                     let planes = [-depth * self.per_slab, (1.0 - depth) * self.per_slab];
@@ -162,18 +172,38 @@ impl<'a> Splatter<'a> {
         }
     }
 
-    /// Draws the sections of some bricks in a slab by windows.
+    /// Draws the sections of some bricks in a slab by windows, of those that have light.
     fn draw_windows<const W: usize>(
         &self,
         window: &Window<W>,
         (slab, first_row): (usize, usize),
-        bricks: &[u32],
+        (bricks, lit): (&[u32], &Lit),
         passed: &mut [f32],
     ) {
         let (rows, stride) = (passed.len() / self.side, self.side + 2 * W);
         // With room for windows at every side.
         let mut sums = vec![0.0; (rows + 2 * W) * stride];
-        self.sections(slab, first_row, bricks, |section| window.add(&section, [self.side, rows], &mut sums));
+        let mut places = Places::default();
+        for &brick in bricks {
+            let [x, y, depth] = self.placed[brick as usize].first;
+            // All slots, without a branch, so that the loops are vectorized.
+            window.place(&self.slots, [x, y, depth - slab as f32], &mut places);
+            for (slot, amount) in self.matter.voxels(brick as usize) {
+                let slot = slot as usize % BRICK_VOXELS as usize;
+                let [left, top] = [places.left[slot], places.top[slot]];
+                let row = top - first_row as i32;
+                let is_in_band = row > -(W as i32) && row < rows as i32;
+                let is_in_image = left > -(W as i32) && left < self.side as i32;
+                if !(is_in_band && is_in_image && window.reaches(&places, slot)) {
+                    continue;
+                }
+                let last = [left, top].map(|first| (first + W as i32 - 1) as usize);
+                if top > -(W as i32) && top < self.side as i32 && lit.has(last) {
+                    let first = (row + W as i32) as usize * stride + (left + W as i32) as usize;
+                    window.add(&places, slot, amount * self.scale, (&mut sums[first..], stride));
+                }
+            }
+        }
         let sums = sums.chunks_exact(stride).skip(W);
         for (passed, sums) in passed.chunks_exact_mut(self.side).zip(sums) {
             passed.iter_mut().zip(&sums[W..]).for_each(|(passed, &sum)| *passed = self::passed(sum));
@@ -182,7 +212,7 @@ impl<'a> Splatter<'a> {
 }
 
 impl Shape {
-    fn new(light: &LightView, kernel: &Kernel) -> Self {
+    fn new(light: &LightView, kernel: &Kernel, slab_width: f64) -> Self {
         let view = &light.view;
         let from_pixels = view.footprint.footprint_from_pixels;
         let (right, down) = (from_pixels.x_axis, from_pixels.y_axis);
@@ -190,10 +220,10 @@ impl Shape {
         // Where pixels are larger than voxels, the low-pass rule makes every footprint a circle, with a pixel for a grid unit.
         let is_round = metric.iter().zip([1.0, 0.0, 1.0]).all(|(found, round)| (found - round).abs() < 1e-9);
         if is_round && Window::<4>::suits(kernel) {
-            return Self::Small(Window::new(kernel));
+            return Self::Small(Window::new(kernel, slab_width));
         }
         if is_round && Window::<8>::suits(kernel) {
-            return Self::Large(Window::new(kernel));
+            return Self::Large(Window::new(kernel, slab_width));
         }
         Self::Ellipse(Ellipse {
             profile: Profile::new(kernel),

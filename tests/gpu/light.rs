@@ -143,3 +143,18 @@ fn views_keep_light_only_while_it_holds() {
         });
     }
 }
+
+#[test]
+fn memory_is_estimated() {
+    for classification in CLASSIFICATIONS {
+        let (volume, mut scene) = lit(classification);
+        scene.clip.planes = vec![[0.3, 1.0, -0.2, 2.0]];
+        for (occlusion, shadow) in [(0.8, 0.7), (0.0, 0.7), (0.8, 0.0), (0.0, 0.0)] {
+            (scene.shading.occlusion, scene.shading.shadow) = (occlusion, shadow);
+            let mut view = gpu().view(volume.clone(), &scene).unwrap();
+            let estimated = gpu().renderer().estimate(&view).unwrap();
+            gpu().draw(&mut view).unwrap();
+            assert_eq!(view.gpu_bytes(), estimated, "{classification:?}, {occlusion}, {shadow}");
+        }
+    }
+}
