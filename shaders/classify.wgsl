@@ -39,6 +39,8 @@
 @group(0) @binding(16) var<storage, read_write> carried: array<vec4u>;
 // The slots of pages, where voxels are in pages.
 @group(0) @binding(17) var pages: texture_2d_array<u32>;
+// See `shared/light`.
+@group(0) @binding(18) var light_sheets: texture_3d<f32>;
 
 var<private> cut: Cut;
 

@@ -24,6 +24,8 @@
 @group(0) @binding(15) var colors: texture_2d_array<u32>;
 // The gradients of the membership of labels.
 @group(0) @binding(16) var membership: texture_2d_array<u32>;
+// See `shared/light`.
+@group(0) @binding(19) var light_sheets: texture_3d<f32>;
 
 fn begin_layer(layer: u32) {}
 

@@ -30,6 +30,8 @@
 @group(0) @binding(16) var coefficients: texture_2d_array<u32>;
 // Those of the voxels' own, if they have any.
 @group(0) @binding(17) var colors: texture_2d_array<u32>;
+// See `shared/light`.
+@group(0) @binding(19) var light_sheets: texture_3d<f32>;
 
 // The maximum number of channels.
 const MOST_LAYERS = 16u;

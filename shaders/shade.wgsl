@@ -27,6 +27,8 @@
 @group(0) @binding(9) var pages: texture_2d_array<u32>;
 // The gradients of the membership of labels.
 @group(0) @binding(10) var membership: texture_2d_array<u32>;
+// See `shared/light`.
+@group(0) @binding(11) var light_sheets: texture_3d<f32>;
 
 @compute @workgroup_size(64)
 fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) workgroup: vec3u) {
@@ -60,5 +62,5 @@ fn amount_in_channel(voxel: vec3u, channel: u32, light: Lighting) -> vec4f {
     let opacity = ramp(ramps.y, ramps.z, value).x;
     let gradient_opacity = ramp(ramps.z, ramps.w, gradient.magnitude).x;
     let m = amount(opacity * gradient_opacity * own.a);
-    return select(vec4f(shade(own.rgb, gradient, light) * m, m), vec4f(0.0), HOLES && is_hole(stored));
+    return select(vec4f(shade(own.rgb, gradient, light, vec3f(voxel)) * m, m), vec4f(0.0), HOLES && is_hole(stored));
 }

@@ -119,6 +119,7 @@ mod gpu;
 pub mod headless;
 pub mod image;
 mod kernel;
+mod light;
 mod lists;
 pub mod part;
 #[cfg(feature = "gpu")]
@@ -205,6 +206,11 @@ pub mod internals {
         pub use crate::kernel::Kernel;
     }
 
+    /// Light sheets.
+    pub mod light {
+        pub use crate::light::*;
+    }
+
     /// Classification after splatting.
     pub mod after {
         pub use crate::after::*;
@@ -214,8 +220,8 @@ pub mod internals {
     #[cfg(feature = "gpu")]
     pub mod gpu {
         pub use crate::gpu::{
-            bindings, brick_lists, classified_volume, device, footprint_texture, gathered_layout, layout, ramps,
-            render_pipeline, shaders, targets, timer, uniforms, volume_texture,
+            bindings, brick_lists, classified_volume, device, footprint_texture, gathered_layout, layout,
+            light_texture, ramps, render_pipeline, shaders, targets, timer, uniforms, volume_texture,
         };
     }
 

@@ -42,6 +42,12 @@ pub struct Stats {
     /// The largest resident set of the process until then, in MiB, if the program measured it: where a volume is streamed, on systems that tell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub peak_rss_mib: Option<f64>,
+    /// Milliseconds of the frame in which light sheets were made (SPEC §14), little where they were kept; only where there are any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light_ms: Option<f64>,
+    /// Bytes of memory that they take.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light_bytes: Option<u64>,
     /// Milliseconds to load or make the volume.
     pub load_ms: f64,
     /// Milliseconds to classify, bucket and upload.

@@ -73,12 +73,12 @@ fn shaded_further(voxel: vec3u, channel: u32, p: vec4f) -> Shaded {
     let gradient = gradient_at(voxel);
     let own = own_color(channel, index, ramp(ramps.x, ramps.y, value));
     let alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
-    return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, p);
+    return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, voxel, p);
 }
 
-fn of_opacity(color: vec3f, alpha: f32, gradient: Gradient, p: vec4f) -> Shaded {
+fn of_opacity(color: vec3f, alpha: f32, gradient: Gradient, voxel: vec3u, p: vec4f) -> Shaded {
     let m = amount(alpha);
-    return Shaded(vec4f(shade(color, gradient, lighting(p.xy, PERSPECTIVE)) * m, m), alpha);
+    return Shaded(vec4f(shade(color, gradient, lighting(p.xy, PERSPECTIVE), vec3f(voxel)) * m, m), alpha);
 }
 
 // In the first channel.
@@ -109,5 +109,5 @@ fn shaded_first(voxel: vec3u, p: vec4f) -> Shaded {
         alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
     }
     let own = own_color(0u, index, color);
-    return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, p);
+    return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, voxel, p);
 }

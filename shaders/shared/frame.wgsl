@@ -12,6 +12,8 @@ struct Frame {
     shading: vec4f,
     background: vec4f,
     gradient: vec4f,
+    light_place: array<vec4f, 6>,
+    light_stacks: array<vec4f, 2>,
     dims: vec4u,
     ramps: vec4u,
     size: vec2u,

@@ -3,6 +3,7 @@
 //
 // #import shared/cells
 // #import shared/frame
+// #import shared/light
 // #import shared/ramps
 // #import shared/shading
 // #import shared/slab_integral
@@ -72,6 +73,21 @@ fn gradient_between(near: vec4f, far: vec4f, share: f32) -> Gradient {
     return gradient_of(0.5 * seen_channel.per_number * mix(near.yzw, far.yzw, share));
 }
 
+// A stretch of a pixel's ray: the position on the image that identifies it, and the sheet depths of its ends.
+struct Way {
+    at: vec3f,
+    near: f32,
+    far: f32,
+}
+
+// A point of it in voxels, which only light sheets ask for.
+fn point_on(way: Way, share: f32) -> vec3f {
+    if !LIGHT {
+        return vec3f(0.0);
+    }
+    return voxel_at(way.at, mix(way.near, way.far, share));
+}
+
 // The opacity of a gradient.
 fn gradient_opacity(table: Table, gradient: Gradient) -> f32 {
     // Without gradient opacity the ramp is a single point. (A loop is left out where no thread needs it.)
@@ -82,19 +98,20 @@ fn gradient_opacity(table: Table, gradient: Gradient) -> f32 {
     return opacity;
 }
 
-// The shaded means over the values between two samples, each a number and its gradient, from the nearer to the farther one. `own` is the colour of the
-// voxels' own there.
-fn look(near: vec4f, far: vec4f, own: vec4f, table: Table, light: Lighting) -> Look {
+// The shaded means over the values between two samples, each a number and its gradient, from the nearer to the farther one, which lie at two points in
+// voxels. `own` is the colour of the voxels' own there.
+fn look(near: vec4f, far: vec4f, way: Way, own: vec4f, table: Table, light: Lighting) -> Look {
     let means = slab_integral(table, near.x, far.x);
     if means.amount <= 0.0 {
         return Look(0.0, vec3f(0.0));
     }
-    return look_at(means, near, far, own, table, light);
+    return look_at(means, near, far, way, own, table, light);
 }
 
 // The same, given the means.
-fn look_at(means: SlabIntegral, near: vec4f, far: vec4f, own: vec4f, table: Table, light: Lighting) -> Look {
+fn look_at(means: SlabIntegral, near: vec4f, far: vec4f, way: Way, own: vec4f, table: Table, light: Lighting) -> Look {
     let gradient = gradient_between(near, far, means.share);
     let color = colored(means.color, own);
-    return Look(means.amount * color.a * gradient_opacity(table, gradient), shade(color.rgb, gradient, light));
+    let voxel = point_on(way, means.share);
+    return Look(means.amount * color.a * gradient_opacity(table, gradient), shade(color.rgb, gradient, light, voxel));
 }

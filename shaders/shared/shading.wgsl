@@ -1,6 +1,7 @@
 // Classification and shading (SPEC §3).
 //
 // #import shared/frame
+// #import shared/light
 // #import shared/project
 // #import shared/volume
 
@@ -43,18 +44,20 @@ fn lighting(px: vec2f, in_perspective: bool) -> Lighting {
     return Lighting(light, select(sum / max(size, 1e-6), vec3f(0.0), size < 1e-6));
 }
 
-fn shade(color: vec3f, gradient: Gradient, lighting: Lighting) -> vec3f {
+// The colour of a point, given in voxel coordinates.
+fn shade(color: vec3f, gradient: Gradient, lighting: Lighting, voxel: vec3f) -> vec3f {
     if frame.light.w == 0.0 {
         return color;
     }
-    let ambient = frame.shading.x;
+    let left = light_left(voxel);
+    let ambient = frame.shading.x * left.x;
     if gradient.magnitude == 0.0 {
         return clamp(color * ambient, vec3f(0.0), vec3f(1.0));
     }
     let n = gradient.normal;
-    let diffuse = frame.shading.y * abs(dot(n, lighting.light));
+    let diffuse = frame.shading.y * left.y * abs(dot(n, lighting.light));
     let cosine = min(abs(dot(n, lighting.half_vector)), 1.0);
     // Of 0 a driver's power may be NaN.
-    let highlight = frame.shading.z * select(0.0, pow(cosine, frame.shading.w), cosine > 0.0);
+    let highlight = frame.shading.z * left.y * select(0.0, pow(cosine, frame.shading.w), cosine > 0.0);
     return clamp(color * (ambient + diffuse) + highlight, vec3f(0.0), vec3f(1.0));
 }

@@ -210,7 +210,8 @@ fn sheets_of(slab: Slab, light: Lighting) -> SlabSheets {
             seen_slab.middle = middle_of(slab, means.amount, table);
         }
         for (var is_shown = means.amount > 0.0 && !is_whole; is_shown; is_shown = false) {
-            let seen = look_at(means, segment.first, segment.last, slab.own, table, light);
+            let way = Way(slab.at, segment.near, segment.near + segment.width);
+            let seen = look_at(means, segment.first, segment.last, way, slab.own, table, light);
             let share = shown_share(slab.ray, segment.near, segment.width);
             let sheet = vec4f(seen.color, 1.0) * (seen.amount * share * segment.width * slab.per_depth);
             sheets.near = select(sheets.near, sheet, step == 1u);
@@ -276,7 +277,9 @@ fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
             let gradient = gradient_between(segment.first, segment.last, found.share);
             let number = mix(segment.first.x, segment.last.x, found.share);
             let color = colored(color_at(found.table, number), slab.own);
-            return Composited(vec4f(shade(color.rgb, gradient, light), 1.0), vec4u(), vec4f(), sheet_depth, true);
+            let voxel = point_on(Way(slab.at, sheet_depth, sheet_depth), 0.0);
+            let shaded = vec4f(shade(color.rgb, gradient, light, voxel), 1.0);
+            return Composited(shaded, vec4u(), vec4f(), sheet_depth, true);
         }
     }
     return result;
@@ -336,7 +339,7 @@ fn choose(slab: Slab, image: vec4f, before: vec4u, color_before: vec4f, light: L
         let color = colored(mean.color, own);
         seen = Look(mean.amount * color.a, color.rgb);
     } else {
-        seen = look(point, point, own, table, light);
+        seen = look(point, point, Way(slab.at, sheet_depth, sheet_depth), own, table, light);
     }
     let alpha = min(seen.amount, 1.0);
     let is_hit = alpha >= cut.first_hit;

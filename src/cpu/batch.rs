@@ -28,7 +28,7 @@ impl Batch<'_> {
         let mut batch = Self {
             count: 0,
             materials: [nothing; LANES],
-            unshaded: Unshaded::default(),
+            unshaded: Unshaded::new(),
             splats: Default::default(),
             flat_step,
         };

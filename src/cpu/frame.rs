@@ -25,6 +25,7 @@ use crate::abandon::Abandoned;
 use crate::geometry::means;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::kernel::Kernel;
+use crate::light::Lights;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::{Overlaps, PlaceDepths, tile_grid};
 use crate::parallel::prelude::*;
@@ -44,6 +45,8 @@ pub(super) struct Frame<'a> {
     pub(super) projection: Projection,
     pub(super) splatter: Splatter,
     pub(super) shader: Shader,
+    /// The light sheets, if there are any.
+    pub(super) lights: Option<Arc<Lights>>,
     pub(super) compositor: Compositor,
     pub(super) rays: RayMode,
     pub(super) drawn: Drawn,
@@ -130,6 +133,8 @@ pub(super) struct Host {
     pub(super) first_hit: Option<f64>,
     /// The opaque surfaces that end rays.
     pub(super) surfaces: Option<Surfaces>,
+    /// The light sheets of all channels, if there are any (SPEC §14).
+    pub(super) lights: Option<Arc<Lights>>,
 }
 
 impl<'a> Frame<'a> {
@@ -139,7 +144,7 @@ impl<'a> Frame<'a> {
         voxels: Voxels<'a>,
         scene: &Scene,
         view: ViewGeometry,
-        Host { window, is_part, first_hit, surfaces }: Host,
+        Host { window, is_part, first_hit, surfaces, lights }: Host,
         (level, drawn): (Level, Drawn),
     ) -> Self {
         let (splatting, image) = (&scene.splatting, &scene.image);
@@ -177,6 +182,7 @@ impl<'a> Frame<'a> {
             voxels,
             splatter,
             shader: Shader::new(&scene.shading, &scene.camera.basis(), splatting.compositing),
+            lights,
             compositor,
             rays: RayMode::new(scene, &view, grid, surfaces),
             drawn: drawn.renewed(bricks, &view),

@@ -56,6 +56,7 @@ use crate::error::RenderError;
 use crate::error::setting::{Interval, SettingError};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
+use crate::light::KeptLight;
 use crate::part::{self, Content, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::rendering::{Backend, Rendering};
@@ -86,6 +87,8 @@ pub struct CpuRenderer {
     surfaces: Option<Arc<[f32]>>,
     /// The last frame's first hits.
     hits: Option<FirstHits>,
+    /// Light sheets and what they are made of.
+    light: KeptLight,
 }
 
 impl CpuRenderer {
@@ -102,7 +105,8 @@ impl CpuRenderer {
         let scene = scene.settled(&volume);
         let transfer = scene.resolve(&volume);
         let layers = layer::layers(&volume, &transfer, &scene)?;
-        Ok(Self { volume, scene, transfer, layers, simd, level, first_hit: None, surfaces: None, hits: None })
+        let (first_hit, surfaces, hits, light) = (None, None, None, KeptLight::default());
+        Ok(Self { volume, scene, transfer, layers, simd, level, first_hit, surfaces, hits, light })
     }
 
     /// The volume that is drawn.
@@ -244,7 +248,7 @@ impl CpuRenderer {
         let (Drawing { content, counts, first_hits }, view) = self.drawing(window, false)?;
         self.hits = self.first_hit.map(|_| FirstHits { view, region, depths: first_hits });
         let image = Image { width: region.width, height: region.height, pixels: content.colors };
-        Ok(Rendering { image, stats: statistics(self.simd, self.size(), counts, start) })
+        Ok(Rendering { image, stats: self.statistics(counts, start) })
     }
 
     /// Draws a part of the image (SPEC §11), and returns it with its statistics. First hits are not noted.
@@ -260,7 +264,7 @@ impl CpuRenderer {
         }
         let (Drawing { content, counts, .. }, view) = self.drawing(window.clone(), true)?;
         let part = Part::new((&self.volume.clone().into(), &self.scene), &view, window, content)?;
-        Ok((part, statistics(self.simd, self.size(), counts, start)))
+        Ok((part, self.statistics(counts, start)))
     }
 
     /// Draws a window to those of its pixels, row by row, that are not closed, and returns them with statistics.
@@ -282,7 +286,12 @@ impl CpuRenderer {
             depths.into()
         });
         let (Drawing { content, counts, .. }, _) = self.drawing(window.clone(), true)?;
-        Ok((content, statistics(self.simd, self.size(), counts, start)))
+        Ok((content, self.statistics(counts, start)))
+    }
+
+    /// The statistics of a frame that began at a time.
+    fn statistics(&self, counts: Counts, start: Instant) -> Stats {
+        self.light.noted_in(statistics(self.simd, self.size(), counts, start))
     }
 
     /// The image's width and height.
@@ -300,7 +309,9 @@ impl CpuRenderer {
         let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, [width, height])?;
         let window = if is_part { window.opened(&view.slabs_of(self.volume.grid())) } else { window };
         let first_hit = self.first_hit.filter(|_| !is_part);
-        let host = Host { window, is_part, first_hit, surfaces: self.surfaces_of([width, height])? };
+        let surfaces = self.surfaces_of([width, height])?;
+        let lights = self.light.lights((&self.volume, &self.transfer), &scene, &scene.camera)?;
+        let host = Host { window, is_part, first_hit, surfaces, lights };
         Ok((layer::draw(&mut self.layers, &scene, view, host, self.level), view))
     }
 }

@@ -6,12 +6,13 @@ use glam::DVec3;
 
 use super::material::Material;
 use super::vector::{LANES, optical_depth, power};
+use crate::light::Left;
 use crate::settings::camera::ViewBasis;
 use crate::settings::shading::{MAX_SHADING, Shading};
 use crate::settings::splatting::Compositing;
 
 /// Up to eight voxels to be shaded, by lane.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Unshaded {
     color: [[f32; LANES]; 3],
     /// α, the opacity per unit length.
@@ -20,9 +21,30 @@ pub(super) struct Unshaded {
     to_eye: [[f32; LANES]; 3],
     /// The factor for amounts.
     scale: [f32; LANES],
+    /// What is left of ambient and of other light (SPEC §14).
+    left: [[f32; LANES]; 2],
 }
 
 impl Unshaded {
+    /// No voxels, in full light.
+    pub(super) fn new() -> Self {
+        let zero = [0.0; LANES];
+        Self {
+            color: [zero; 3],
+            alpha: zero,
+            normal: [zero; 3],
+            to_eye: [zero; 3],
+            scale: zero,
+            left: [[1.0; LANES]; 2],
+        }
+    }
+
+    /// Puts into a lane what is left of light.
+    #[inline(always)]
+    pub(super) fn set_left(&mut self, lane: usize, Left { ambient, direct }: Left) {
+        (self.left[0][lane], self.left[1][lane]) = (ambient, direct);
+    }
+
     /// Puts a voxel's material into a lane.
     #[inline(always)]
     pub(super) fn set_material(&mut self, lane: usize, material: &Material) {
@@ -80,11 +102,12 @@ impl Shader {
             false => alpha,
         } * load(&voxels.scale);
         let of = |[x, y, z]: &[[f32; LANES]; 3]| [load(x), load(y), load(z)];
-        let [red, green, blue] = self.color(simd, of(&voxels.color), of(&voxels.normal), of(&voxels.to_eye));
+        let left = [load(&voxels.left[0]), load(&voxels.left[1])];
+        let [red, green, blue] = self.color(simd, of(&voxels.color), of(&voxels.normal), of(&voxels.to_eye), left);
         [(red * amount).to_array(), (green * amount).to_array(), (blue * amount).to_array(), amount.to_array()]
     }
 
-    /// The colours in this light. A normal of 0 stands for a voxel without a direction, which gets ambient light alone.
+    /// The colours in this light, of which A and S are left. A normal of 0 stands for a voxel without a direction, which gets ambient light alone.
     #[inline(always)]
     pub(super) fn color<S: Simd>(
         &self,
@@ -92,12 +115,14 @@ impl Shader {
         color: [f32x8<S>; 3],
         normal: [f32x8<S>; 3],
         to_eye: [f32x8<S>; 3],
+        [ambient, direct]: [f32x8<S>; 2],
     ) -> [f32x8<S>; 3] {
         if !self.is_enabled {
             return color;
         }
         let (diffuse, highlight) = self.lighting(simd, normal, to_eye);
-        let (factor, zero, one) = (diffuse + self.ambient, f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let (factor, highlight) = (diffuse * direct + ambient * self.ambient, highlight * direct);
+        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
         let lit = |channel: f32x8<S>| (channel * factor + highlight).max(zero).min(one);
         let [red, green, blue] = color;
         [lit(red), lit(green), lit(blue)]

@@ -381,12 +381,25 @@ impl<'a> TileWalk<'a> {
         voxels
     }
 
+    /// Looks up what is left of light at each of some voxels.
+    // Not inlined, so that it is compiled once for all instruction sets.
+    #[inline(never)]
+    fn light_batch(&self, batch: &mut Batch<'_>, count: usize) {
+        let Some(lights) = &self.frame.lights else { return };
+        for lane in 0..count {
+            let [brick, slot] = batch.splats[lane].voxel;
+            let voxel = brick::origin(&self.arrived[brick as usize].brick) + brick::in_brick(slot);
+            batch.unshaded.set_left(lane, lights.left(voxel.as_dvec3()));
+        }
+    }
+
     fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch<'_>) {
         // One function for every instruction set, instead of a copy at every call.
         simd.vectorize(
             #[inline(always)]
             || {
                 let count = std::mem::take(&mut batch.count);
+                self.light_batch(batch, count);
                 let mut amounts = [[0.0; LANES]; 4];
                 for channel in 0..self.frame.channels() {
                     // All at once, so that the memory is waited for once.

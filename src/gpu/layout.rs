@@ -52,6 +52,11 @@ pub struct Frame {
     /// `½/ar`, the factor for the difference of the two neighbours along each axis; and in w the minimum |g| that has a direction, in value per
     /// world unit.
     pub gradient: [f32; 4],
+    /// For the stack of occlusion's light sheets and then for that of shadow's three rows, whose products with voxel coordinates and 1 give where a point is
+    /// looked up: in pixels right of the first one's centre and below it, and in planes from the stack's first one on.
+    pub light_place: [[f32; 4]; 6],
+    /// For each of the two stacks the amount, 0 if there is none, its first plane in the texture, and its last plane from there on; w is unused.
+    pub light_stacks: [[f32; 4]; 2],
     /// The volume's dimensions; w is unused.
     pub dims: [u32; 4],
     /// The ends of the first drawn channel's colour, opacity and gradient opacity ramps in the control points; w is unused.

@@ -13,6 +13,7 @@ pub mod gathered_layout;
 pub(crate) mod gpu_volume;
 pub(crate) mod hiding;
 pub mod layout;
+pub mod light_texture;
 pub(crate) mod membership;
 pub(crate) mod options;
 pub(crate) mod placement;

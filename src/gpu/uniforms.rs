@@ -26,7 +26,7 @@ use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::Window;
 use crate::volume::Grid;
 
-/// The constants of a frame, for a volume with this grid and format of values.
+/// The constants of a frame without light sheets, for a volume with this grid and format of values.
 pub fn frame(
     view: &ViewGeometry,
     kernel: &Kernel,
@@ -56,6 +56,8 @@ pub fn frame(
         shading: [ambient, diffuse, specular, shininess].map(|x| x.clamp(0.0, MAX_SHADING) as f32),
         background: premultiplied(scene.image.background),
         gradient: (0.5 / grid.aspect()).extend(MIN_GRADIENT).as_vec4().to_array(),
+        light_place: [[0.0; 4]; 6],
+        light_stacks: [[0.0; 4]; 2],
         dims: grid.dims.extend(0).to_array(),
         ramps: [color_end, opacity_end, gradient_opacity_end, 0],
         size: view.size,

@@ -276,7 +276,7 @@ impl GpuHeadless {
         let (counts, stages_ms) = counts.arrived(counts.arrival().recv().map_err(missing)?)?;
         let info = self.adapter.get_info();
         let ImageSettings { width, height, .. } = view.scene().image;
-        Ok(Stats {
+        Ok(view.light.noted_in(Stats {
             driver: driver_name(&info),
             adapter: info.name,
             backend: Backend::Gpu.name().to_owned(),
@@ -292,7 +292,9 @@ impl GpuHeadless {
             load_ms: 0.0,
             prepare_ms,
             frame_ms,
-        })
+            light_ms: None,
+            light_bytes: None,
+        }))
     }
 }
 

@@ -39,6 +39,8 @@ pub(super) fn draw_part(
     headless: &Headless,
 ) -> Result<(Part, Stats), RenderError> {
     part::check(volume.sample(), scene, window)?;
+    let allowed = "0, or splatting.compositing = \"linear\", \"exponential\" or \"xray\"";
+    scene.shading.refuse_light("for a part of channels whose images are added up", allowed)?;
     let explicit = scene.explicit(volume.sample());
     let ImageSettings { width, height, .. } = explicit.image;
     let view = ViewGeometry::new(volume.grid(), &explicit.camera, &explicit.splatting, [width, height])?;

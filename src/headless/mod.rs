@@ -257,6 +257,9 @@ impl Headless {
         if blank::is_blank(&rendering.image, view.scene().image.background) {
             log::warn!("{}", blank::reason(&rendering.stats, view.volume().sample()));
         }
+        if let Some((key, why)) = view.scene().shading.idle_light() {
+            log::warn!("{key} has no effect: {why}");
+        }
         let store = rendering.stats.store.or(reads);
         Ok(Rendering { stats: Stats { store, ..rendering.stats }, ..rendering })
     }

@@ -6,8 +6,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
 use super::composite::{CompositeBuffers, CompositeMode, slots};
-use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
+use crate::gpu::bindings::{ComputeStage, storage, texture, texture_of_integers, uniform};
 use crate::gpu::layout::FieldPlanes;
+use crate::gpu::light_texture::LightTexture;
 use crate::gpu::shaders;
 use crate::gpu::targets::BandBuffer;
 use crate::gpu::volume_texture::{Pages, VolumeTexture};
@@ -18,6 +19,7 @@ use crate::settings::shading::Gradient;
 pub struct Classify {
     stages: Mutex<HashMap<ClassifyMode, Arc<ComputeStage>>>,
     no_labels: VolumeTexture,
+    no_light: TextureView,
 }
 
 /// The mode that a pipeline is compiled for.
@@ -39,6 +41,8 @@ pub struct ClassifyMode {
     pub own_colors: bool,
     /// The number of segments of a slab.
     pub segments: u32,
+    /// Whether there are light sheets.
+    pub light: bool,
 }
 
 /// The stage's buffers.
@@ -56,6 +60,8 @@ pub struct ClassifyBuffers<'a> {
     pub pages: Option<Pages<'a>>,
     /// The volume's labels, if any of them has its own tables.
     pub labels: Option<&'a TextureView>,
+    /// The light sheets, for a mode that has them.
+    pub light: Option<&'a TextureView>,
 }
 
 /// A band's bind group and pipeline.
@@ -71,7 +77,8 @@ pub const CARRIED_BYTES: u64 = 16;
 impl Classify {
     /// The stage without any pipeline.
     pub fn new(device: &Device) -> Self {
-        Self { stages: Mutex::default(), no_labels: VolumeTexture::no_labels(device) }
+        let no_light = LightTexture::none(device);
+        Self { stages: Mutex::default(), no_labels: VolumeTexture::no_labels(device), no_light }
     }
 
     fn compiled(&self, device: &Device, mode: ClassifyMode) -> Arc<ComputeStage> {
@@ -87,7 +94,7 @@ impl Classify {
         buffers: ClassifyBuffers<'_>,
         (band, carried): (&BandBuffer, &Buffer),
     ) -> ClassifyGroup {
-        let ClassifyBuffers { composite, control_points, planes, values, pages, labels } = buffers;
+        let ClassifyBuffers { composite, control_points, planes, values, pages, labels, light } = buffers;
         let texture = BindingResource::TextureView;
         let own = [
             ("control_points", control_points.as_entire_binding()),
@@ -96,6 +103,7 @@ impl Classify {
             ("planes", planes.as_entire_binding()),
             ("carried", carried.as_entire_binding()),
             ("pages", texture(pages.map_or(values, |pages| pages.view))),
+            ("light_sheets", texture(light.unwrap_or(&self.no_light))),
         ];
         let resources = [&composite.resources(band)[..], &own].concat();
         let stage = self.compiled(device, mode);
@@ -111,7 +119,7 @@ impl Classify {
 }
 
 fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
-    let ClassifyMode { composite, gradient, labels, holes, page_bits, channels, own_colors, segments } = mode;
+    let ClassifyMode { composite, gradient, labels, holes, page_bits, channels, own_colors, segments, light } = mode;
     let stage = ShaderStages::COMPUTE;
     let own = [
         ("control_points", storage::<[f32; 4]>(stage, true)),
@@ -120,6 +128,7 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
         ("planes", uniform::<FieldPlanes>(stage, false)),
         ("carried", storage::<[u32; 4]>(stage, false)),
         ("pages", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("light_sheets", texture(stage, TextureViewDimension::D3)),
     ];
     let slots = [&slots()[..], &own].concat();
     let flag = |is_set| f64::from(u8::from(is_set));
@@ -131,6 +140,7 @@ fn compile(device: &Device, mode: ClassifyMode) -> ComputeStage {
         ("CHANNELS", f64::from(channels)),
         ("OWN_COLORS", flag(own_colors)),
         ("SEGMENTS", f64::from(segments)),
+        ("LIGHT", flag(light)),
     ];
     let constants = [&composite.constants()[..], &own].concat();
     ComputeStage::new(device, shaders::CLASSIFY, "main", &slots, &constants)

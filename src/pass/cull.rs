@@ -76,6 +76,8 @@ pub struct CullBuffers<'a> {
     pub labels: Option<&'a TextureView>,
     /// The gradients of the membership of labels, if any channel is shaded by them.
     pub membership: Option<&'a TextureView>,
+    /// The light sheets, if voxels are shaded by any.
+    pub light: Option<&'a TextureView>,
     /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// The occlusion buffer.
@@ -226,6 +228,7 @@ impl Cull {
                     colors: shared.colors,
                     labels: shared.labels,
                     membership: shared.membership,
+                    light: shared.light,
                     control_points: shared.control_points,
                     places: &fresh,
                     args: &fresh_args,

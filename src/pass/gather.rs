@@ -11,9 +11,10 @@ use wgpu::{
 use super::composite::{CutBuffers, RayMode};
 use super::lanes::{PATCH_THREADS, lanes, threads};
 use crate::gpu::bindings::{
-    ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture_of_integers, uniform,
+    ComputeStage, at_offset, buffer_spec, depth_texture, storage, texture, texture_of_integers, uniform,
 };
 use crate::gpu::layout::{Brick, Cut, FieldPlanes, Frame, Gather as GatherUniform, Gathered, Indirect, PatchRange};
+use crate::gpu::light_texture::LightTexture;
 use crate::gpu::shaders::{self, Lanes};
 use crate::gpu::volume_texture::{OwnColors, Pages, VolumeTexture, page_bits};
 use crate::lists::patch_bins::SHEETS;
@@ -26,6 +27,7 @@ pub struct Gather {
     stages: Mutex<HashMap<GatherMode, Arc<ComputeStage>>>,
     no_labels: OnceLock<VolumeTexture>,
     no_colors: OnceLock<VolumeTexture>,
+    no_light: OnceLock<TextureView>,
 }
 
 /// The mode that a pipeline is compiled for.
@@ -44,6 +46,8 @@ pub struct GatherMode {
     full_color: u32,
     /// Whether any channel has normals of the membership of labels.
     membership: bool,
+    /// Whether there are light sheets.
+    light: bool,
     rays: RayMode,
     /// How values are gathered on slab planes; `None` if colours are.
     planes: Option<PlaneMode>,
@@ -106,6 +110,7 @@ impl GatherMode {
             channels,
             full_color,
             membership: false,
+            light: false,
             rays,
             planes,
             sheets_per_test,
@@ -121,6 +126,11 @@ impl GatherMode {
     /// The same mode with or without normals of the membership of labels.
     pub fn with_membership(self, membership: bool) -> Self {
         Self { membership, ..self }
+    }
+
+    /// The same mode with or without light sheets.
+    pub fn with_light(self, light: bool) -> Self {
+        Self { light, ..self }
     }
 
     /// The same mode for voxels in pages.
@@ -165,6 +175,8 @@ pub struct GatherBuffers<'a> {
     pub labels: Option<&'a TextureView>,
     /// The gradients of the membership of labels, for a mode that needs them.
     pub membership: Option<&'a TextureView>,
+    /// The light sheets, for a mode that has them.
+    pub light: Option<&'a TextureView>,
     /// [`Gathered`].
     pub gathered: &'a Buffer,
     /// [`PatchBins::half_boxes`](crate::lists::patch_bins::PatchBins::half_boxes), `[[f32; 2]]`.
@@ -229,6 +241,9 @@ impl Gather {
         resources.push(("colors", wgpu::BindingResource::TextureView(colors)));
         let pages = buffers.pages.map_or(values, |pages| pages.view);
         resources.push(("pages", wgpu::BindingResource::TextureView(pages)));
+        let no_light = || self.no_light.get_or_init(|| LightTexture::none(device));
+        let light = buffers.light.unwrap_or_else(no_light);
+        resources.push(("light_sheets", wgpu::BindingResource::TextureView(light)));
         if let Some(GatheredPlanes { planes, coefficients }) = buffers.planes {
             resources.push(("planes_of", whole(planes)));
             resources.push(("coefficients", wgpu::BindingResource::TextureView(coefficients.unwrap_or(values))));
@@ -269,6 +284,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("surfaces", depth_texture(stage)),
         ("colors", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("pages", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("light_sheets", texture(stage, TextureViewDimension::D3)),
     ];
     if mode.planes.is_some() {
         slots.push(("planes_of", uniform::<[FieldPlanes; MOST_LAYERS]>(stage, false)));
@@ -290,6 +306,7 @@ fn compile(device: &Device, mode: GatherMode) -> ComputeStage {
         ("PAGE_BITS", f64::from(mode.page_bits)),
         ("CHANNELS", f64::from(mode.channels)),
         ("FULL_COLOR", f64::from(mode.full_color)),
+        ("LIGHT", f64::from(u8::from(mode.light))),
         ("CUT", f64::from(u8::from(mode.rays.cut))),
         ("FIRST_HIT", f64::from(u8::from(mode.rays.first_hit))),
     ];

@@ -5,8 +5,9 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{BindGroup, BindingResource, Buffer, ComputePass, Device, ShaderStages, TextureView, TextureViewDimension};
 
-use crate::gpu::bindings::{ComputeStage, storage, texture_of_integers, uniform};
+use crate::gpu::bindings::{ComputeStage, storage, texture, texture_of_integers, uniform};
 use crate::gpu::layout::{Brick, Frame, Indirect, Splat};
+use crate::gpu::light_texture::LightTexture;
 use crate::gpu::shaders;
 use crate::gpu::volume_texture::{OwnColors, Pages, VolumeTexture, page_bits};
 
@@ -16,6 +17,7 @@ pub struct Shade {
     stages: Mutex<HashMap<ShadeMode, Arc<ComputeStage>>>,
     no_labels: VolumeTexture,
     no_colors: VolumeTexture,
+    no_light: TextureView,
 }
 
 /// The mode that a pipeline is compiled for.
@@ -29,6 +31,8 @@ struct ShadeMode {
     /// The number in the voxels' own colours that stands for 1; 0 if they have none.
     full_color: u32,
     membership: bool,
+    /// Whether there are light sheets.
+    light: bool,
 }
 
 /// The buffers that the stage reads and writes.
@@ -52,6 +56,8 @@ pub struct ShadeBuffers<'a> {
     pub labels: Option<&'a TextureView>,
     /// The gradients of the membership of labels, if any channel is shaded by them.
     pub membership: Option<&'a TextureView>,
+    /// The light sheets, if there are any.
+    pub light: Option<&'a TextureView>,
     /// The control points of the ramps.
     pub control_points: &'a Buffer,
     /// `[u32]`: the places.
@@ -73,7 +79,7 @@ impl Shade {
     /// The stage, with nothing compiled yet.
     pub fn new(device: &Device) -> Self {
         let [no_labels, no_colors] = [VolumeTexture::no_labels(device), VolumeTexture::no_colors(device)];
-        Self { stages: Mutex::default(), no_labels, no_colors }
+        Self { stages: Mutex::default(), no_labels, no_colors, no_light: LightTexture::none(device) }
     }
 
     /// Binds buffers.
@@ -92,6 +98,7 @@ impl Shade {
             ("colors", BindingResource::TextureView(buffers.colors.map_or(&self.no_colors.view, |own| own.view))),
             ("pages", BindingResource::TextureView(buffers.pages.map_or(values, |pages| pages.view))),
             ("membership", BindingResource::TextureView(buffers.membership.unwrap_or(&self.no_labels.view))),
+            ("light_sheets", BindingResource::TextureView(buffers.light.unwrap_or(&self.no_light))),
         ];
         let mode = ShadeMode {
             labels: labels.is_some(),
@@ -100,6 +107,7 @@ impl Shade {
             channels: buffers.channels,
             full_color: buffers.colors.map_or(0, |own| own.full),
             membership: buffers.membership.is_some(),
+            light: buffers.light.is_some(),
         };
         let mut stages = self.stages.lock().unwrap_or_else(PoisonError::into_inner);
         let stage = Arc::clone(stages.entry(mode).or_insert_with(|| Arc::new(compile(device, mode))));
@@ -113,7 +121,7 @@ impl Shade {
 }
 
 fn compile(device: &Device, mode: ShadeMode) -> ComputeStage {
-    let ShadeMode { labels, holes, page_bits, channels, full_color, membership } = mode;
+    let ShadeMode { labels, holes, page_bits, channels, full_color, membership, light } = mode;
     let stage = ShaderStages::COMPUTE;
     let slots = [
         ("frames", uniform::<Frame>(stage, false)),
@@ -127,6 +135,7 @@ fn compile(device: &Device, mode: ShadeMode) -> ComputeStage {
         ("colors", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("pages", texture_of_integers(stage, TextureViewDimension::D2Array)),
         ("membership", texture_of_integers(stage, TextureViewDimension::D2Array)),
+        ("light_sheets", texture(stage, TextureViewDimension::D3)),
     ];
     let flag = |is_set| f64::from(u8::from(is_set));
     let constants = [
@@ -136,6 +145,7 @@ fn compile(device: &Device, mode: ShadeMode) -> ComputeStage {
         ("CHANNELS", f64::from(channels)),
         ("FULL_COLOR", f64::from(full_color)),
         ("MEMBERSHIP", flag(membership)),
+        ("LIGHT", flag(light)),
     ];
     ComputeStage::new(device, shaders::SHADE, "main", &slots, &constants)
 }

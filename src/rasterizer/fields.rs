@@ -214,6 +214,7 @@ impl FieldRasterizer {
             values: volume.values(),
             pages: volume.pages(),
             labels: inputs.labels(),
+            light: inputs.light,
         };
         let mode = ClassifyMode {
             composite: CompositeMode { compositing: request.splatting.compositing, rays: request.rays },
@@ -224,6 +225,7 @@ impl FieldRasterizer {
             channels: channels.len() as u32,
             own_colors: request.colored() > 0,
             segments: request.splatting.segments(),
+            light: inputs.light.is_some(),
         };
         let bands = compositing.bands.iter().zip(carried);
         bands.map(|band| self.classify.bind(device, mode, buffers, band)).collect()

@@ -51,6 +51,8 @@ pub(crate) struct FrameInputs<'a> {
     pub(crate) control_points: &'a Buffer,
     pub(crate) compositing: &'a CompositingBuffer,
     pub(crate) cut: CutBuffers<'a>,
+    /// The light sheets, if there are any (SPEC §14).
+    pub(crate) light: Option<&'a TextureView>,
 }
 
 /// The resources that a rasterizer's part of a frame needs.

@@ -119,6 +119,7 @@ impl SampleRasterizer {
                 colors: inputs.colors(),
                 labels: inputs.labels(),
                 membership: inputs.membership(),
+                light: inputs.light,
                 control_points: inputs.control_points,
                 places: &buffers.order,
                 args: &buffers.args,

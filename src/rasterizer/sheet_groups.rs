@@ -144,6 +144,7 @@ impl SheetGroups {
             colors,
             labels,
             membership: inputs.membership(),
+            light: inputs.light,
             control_points,
             occluded: &self.targets.occluded,
             culled: &self.culled,

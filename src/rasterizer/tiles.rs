@@ -116,6 +116,7 @@ impl TileRasterizer {
         let mode = GatherMode::of(splatting, planes, view.perspective.is_some(), of_volume, *rays, bins.workgroups)
             .with_channels(request.ramps.channels, colors)
             .with_membership(inputs.membership().is_some())
+            .with_light(inputs.light.is_some())
             .with_pages(volume.pages());
         let buffers = GatherBuffers {
             frame: inputs.frame,
@@ -130,6 +131,7 @@ impl TileRasterizer {
             colors,
             labels: inputs.labels(),
             membership: inputs.membership(),
+            light: inputs.light,
             gathered: &own.gathered,
             half_boxes: &own.half_boxes,
             cut: inputs.cut,

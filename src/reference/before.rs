@@ -3,12 +3,13 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DVec4;
 
 use super::first_hit::FirstHits;
 use super::visibility::{OpaqueMask, Test};
-use super::{Areas, Buffer, Culled, Cuts, Geometry, Host, Means, Section, Splat};
+use super::{Areas, Buffer, Culled, Cuts, Geometry, Host, Lights, Means, Section, Splat};
 use super::{composite, resolve, shading, sheets, splat};
 use crate::error::RenderError;
 use crate::kernel::Kernel;
@@ -32,7 +33,11 @@ struct Frame {
 }
 
 impl Frame {
-    fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+    fn new(
+        volume: &Volume,
+        transfer: &TransferFunction,
+        (scene, lights): (&Scene, Option<&Arc<Lights>>),
+    ) -> Result<Self, RenderError> {
         // The settings are checked before the camera is framed, which needs valid ones.
         scene.check()?;
         transfer.check()?;
@@ -40,7 +45,8 @@ impl Frame {
         let geometry = Geometry::new(volume.grid(), scene)?;
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let voxels = shading::taking_part(volume, transfer, &geometry);
-        let splats = shading::splats(&voxels, volume, transfer, scene, &geometry);
+        let lights = Lights::or_new(lights, volume, transfer, scene)?;
+        let splats = shading::splats(&voxels, volume, transfer, (scene, &lights), &geometry);
         Ok(Self { geometry, kernel, voxels, splats })
     }
 
@@ -57,7 +63,8 @@ impl Frame {
 
 /// See [`super::count`].
 pub(super) fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
-    let frame = Frame::new(volume, transfer, scene)?;
+    // Counts do not depend on light.
+    let frame = Frame::new(volume, transfer, (scene, Some(&Arc::default())))?;
     let buckets = frame.buckets();
     let sections = match scene.splatting.method {
         Method::CompositeEverySample => frame.splats.len() as u64,
@@ -87,10 +94,10 @@ pub(super) fn render_for(
     host: Host<'_>,
     volume: &Volume,
     transfer: &TransferFunction,
-    scene: &Scene,
+    (scene, lights): (&Scene, Option<&Arc<Lights>>),
     test: Option<Test>,
 ) -> Result<Culled, RenderError> {
-    let frame = Frame::new(volume, transfer, scene)?;
+    let frame = Frame::new(volume, transfer, (scene, lights))?;
     host.check(scene)?;
     let picture = Picture::drawn(&frame, scene, (host, Window::ALL_SLABS), test);
     let image =
@@ -107,7 +114,7 @@ pub(super) fn part(
     scene: &Scene,
     Window { slabs, region }: &Window,
 ) -> Result<Content, RenderError> {
-    let frame = Frame::new(volume, transfer, scene)?;
+    let frame = Frame::new(volume, transfer, (scene, None))?;
     let acc = Picture::drawn(&frame, scene, (Host::default(), slabs.clone()), None).acc;
     let rows = acc.pixels.chunks(acc.width).skip(region.rows().start).take(region.rows().len());
     let colors = rows.flat_map(|row| &row[region.columns()]).map(|pixel| pixel.as_vec4().to_array());

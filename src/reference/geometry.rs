@@ -7,7 +7,7 @@ use glam::{DMat2, DVec2, DVec3, UVec3};
 use super::footprint::{Footprint, Ray};
 use super::{Section, Splat};
 use crate::error::RenderError;
-use crate::error::setting::SettingError;
+use crate::error::setting::{SettingError, scaled};
 use crate::geometry::slab::SlabGrid;
 use crate::kernel::Kernel;
 use crate::scene::Scene;
@@ -99,6 +99,40 @@ impl Geometry {
         if splatting.method == Method::ImageAligned {
             geometry.check_slabs(splatting.radius, splatting.slab_width)?;
         }
+        Ok(geometry)
+    }
+
+    /// The geometry of a scene's light sheets towards the unit vector `to_light` (SPEC §14).
+    ///
+    /// # Errors
+    /// If there are too many slabs.
+    pub fn of_light(grid: &Grid, scene: &Scene, to_light: DVec3) -> Result<Self, RenderError> {
+        let (splatting, step) = (&scene.splatting, scene.shading.light_step);
+        let up = scaled(scene.camera.up).normalize();
+        let up = if up.cross(to_light).length() < 0.1 { least_axis(to_light) } else { up };
+        let camera = Camera { direction: -to_light, up, center: None, ..Camera::default() };
+        let (basis, aspect) = (camera.basis(), grid.aspect());
+        let ray = Ray::new(basis.w, &basis, aspect);
+        let footprint = ray.footprint(step);
+        let side = 2.0 * (grid.bounding_radius(splatting.radius) / grid.unit() / step).ceil() + 1.0;
+        let geometry = Self {
+            basis,
+            size: DVec2::splat(side),
+            grid: *grid,
+            center: camera.middle_from(grid) / grid.unit(),
+            eye: None,
+            method: Method::ImageAligned,
+            economies: Economies::default(),
+            pix: step,
+            ro: ray.ro,
+            lambda: ray.lambda,
+            slab_width: step * ray.lambda,
+            footprint_from_pixels: footprint.from_pixels,
+            amplitude: footprint.amplitude,
+            clip: Vec::new(),
+            radius: splatting.radius,
+        };
+        geometry.check_slabs(splatting.radius, step)?;
         Ok(geometry)
     }
 
@@ -285,5 +319,17 @@ impl Geometry {
         };
         let footprint = ray.footprint(eye.pix(splat.depth + middle * ray.depth_per_warped));
         section(footprint, t0, t1, footprint.amplitude)
+    }
+}
+
+/// The world axis least along a vector; ties: x, y, z.
+fn least_axis(along: DVec3) -> DVec3 {
+    let size = along.abs();
+    if size.x <= size.y && size.x <= size.z {
+        DVec3::X
+    } else if size.y <= size.z {
+        DVec3::Y
+    } else {
+        DVec3::Z
     }
 }

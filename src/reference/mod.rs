@@ -11,8 +11,10 @@ mod first_hit;
 pub mod footprint;
 pub mod geometry;
 mod host;
+pub mod light;
 pub mod means;
 pub mod membership;
+mod opacity;
 pub mod ray_march;
 pub mod resolve;
 mod section;
@@ -20,6 +22,8 @@ pub mod shading;
 pub mod sheets;
 pub mod splat;
 pub mod visibility;
+
+use std::sync::Arc;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
@@ -39,6 +43,7 @@ pub use culled::Culled;
 pub use cut::Cuts;
 pub use geometry::Geometry;
 pub use host::Host;
+pub use light::Lights;
 pub use means::Means;
 pub use section::{Section, Splat};
 pub use visibility::Areas;
@@ -96,15 +101,26 @@ pub fn render_for(
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
+    render_lit(host, volume, transfer, (scene, None), test)
+}
+
+/// [`render_for`]; `lights` are those of all channels, where one of them is drawn by itself.
+fn render_lit(
+    host: Host<'_>,
+    volume: &Volume,
+    transfer: &TransferFunction,
+    (scene, lights): (&Scene, Option<&Arc<Lights>>),
+    test: Option<visibility::Test>,
+) -> Result<Culled, RenderError> {
     let classification = scene.classification(volume);
     let joining = Joining::of(scene.splatting.compositing, classification);
     if let Some(joining) = joining.filter(|_| channels(volume, transfer).nth(1).is_some()) {
         return render_joined(host, volume, transfer, scene, test, joining);
     }
     if classification == Classification::After {
-        return after::render_for(host, volume, transfer, scene);
+        return after::render_lit(host, volume, transfer, (scene, lights));
     }
-    before::render_for(host, volume, transfer, scene, test)
+    before::render_for(host, volume, transfer, (scene, lights), test)
 }
 
 /// Renders every channel by itself, and joins the images (SPEC §10).
@@ -120,6 +136,7 @@ fn render_joined(
     transfer.check()?;
     // All channels share a camera.
     let mut scene = scene.framed(volume, transfer);
+    let lights = Arc::new(Lights::new(volume, transfer, &scene)?);
     let background = std::mem::replace(&mut scene.image.background, [0.0; 4]);
     let of_channel = match joining {
         Joining::Sum => host,
@@ -127,7 +144,7 @@ fn render_joined(
     };
     let mut all: Option<Culled> = None;
     for (number, volume) in volume.channels().enumerate().take(1 + transfer.further.len()) {
-        let channel = render_for(of_channel, volume, &transfer.of_channel(number), &scene, test)?;
+        let channel = render_lit(of_channel, volume, &transfer.of_channel(number), (&scene, Some(&lights)), test)?;
         let Some(all) = &mut all else {
             all = Some(channel);
             continue;

@@ -9,7 +9,7 @@
 use glam::{DVec3, DVec4, IVec3, UVec2, UVec3};
 
 use super::composite::composite_pixel;
-use super::{Buffer, Geometry, cut, resolve, shading};
+use super::{Buffer, Geometry, Lights, cut, resolve, shading};
 use crate::error::RenderError;
 use crate::image::Image;
 use crate::kernel::Kernel;
@@ -48,7 +48,7 @@ pub fn pixels(
     let mut exponential = scene.framed(volume, transfer);
     exponential.splatting.compositing = Compositing::Exponential;
     let geometry = Geometry::new(volume.grid(), &exponential)?;
-    let field = Field::new(volume, transfer, &exponential, &geometry);
+    let field = Field::new(volume, transfer, &exponential, &geometry)?;
     let marched = pixels.par_iter().map(|&pixel| field.march(&PixelRay::new(&geometry, pixel))).collect();
     let acc = Buffer { width: pixels.len(), pixels: marched };
     // Rays march to their ends.
@@ -120,11 +120,17 @@ struct Field {
 impl Field {
     const CUBE: f64 = 4.0;
 
-    fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geometry: &Geometry) -> Self {
+    fn new(
+        volume: &Volume,
+        transfer: &TransferFunction,
+        scene: &Scene,
+        geometry: &Geometry,
+    ) -> Result<Self, RenderError> {
+        let lights = Lights::new(volume, transfer, scene)?;
         let grid = *volume.grid();
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let voxels = shading::taking_part(volume, transfer, geometry);
-        let emission = |&index: &u32| shading::emission(volume, transfer, scene, geometry, index);
+        let emission = |&index: &u32| shading::emission(volume, transfer, (scene, &lights), geometry, index);
         let mut emissions = vec![DVec4::ZERO];
         emissions.par_extend(voxels.par_iter().map(emission));
         let mut places = vec![0; volume.values().len()];
@@ -141,7 +147,7 @@ impl Field {
                 is_reached[row + low.x as usize..=row + high.x as usize].fill(true);
             }
         }
-        Self { grid, kernel, emissions, places, cubes, is_reached }
+        Ok(Self { grid, kernel, emissions, places, cubes, is_reached })
     }
 
     /// Whether any kernel may reach a point in voxel coordinates.

@@ -2,16 +2,19 @@
 
 use glam::{DVec3, DVec4};
 
+use super::light::{Left, Lights};
+use super::opacity::alpha;
+pub use super::opacity::amount;
 pub use super::section::Splat;
 use super::{Geometry, membership};
+use crate::error::RenderError;
 use crate::error::setting::scaled;
 use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::scene::Scene;
 use crate::settings::shading::Light;
-use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::{Members, Volume};
+use crate::volume::Volume;
 
 /// The indices in memory of the voxels that take part, ascending.
 pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {
@@ -26,8 +29,17 @@ pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geom
 }
 
 /// Projects and shades the voxels that take part, in memory order.
-pub fn shade(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geometry: &Geometry) -> Vec<Splat> {
-    splats(&taking_part(volume, transfer, geometry), volume, transfer, scene, geometry)
+///
+/// # Errors
+/// If the scene's light sheets need more than can be computed.
+pub fn shade(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    scene: &Scene,
+    geometry: &Geometry,
+) -> Result<Vec<Splat>, RenderError> {
+    let lights = Lights::new(volume, transfer, scene)?;
+    Ok(splats(&taking_part(volume, transfer, geometry), volume, transfer, (scene, &lights), geometry))
 }
 
 /// Projects and shades voxels, given by their indices in memory.
@@ -35,12 +47,12 @@ pub fn splats(
     voxels: &[u32],
     volume: &Volume,
     transfer: &TransferFunction,
-    scene: &Scene,
+    (scene, lights): (&Scene, &Lights),
     geometry: &Geometry,
 ) -> Vec<Splat> {
     let splat = |&index: &u32| {
         let voxel = volume.grid().voxel_at(index);
-        let amount = emission(volume, transfer, scene, geometry, index) * geometry.scale(voxel);
+        let amount = emission(volume, transfer, (scene, lights), geometry, index) * geometry.scale(voxel);
         let alpha = channels(volume, transfer).map(|(volume, transfer)| alpha(volume, transfer, index)).sum();
         Splat { center: geometry.pixel(voxel), depth: geometry.depth(voxel), amount, alpha }
     };
@@ -48,8 +60,15 @@ pub fn splats(
 }
 
 /// `(C·m, m)` of a voxel, the sum of all channels' (SPEC §10): their footprints are the same, so one splat draws them all.
-pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geometry: &Geometry, index: u32) -> DVec4 {
+pub fn emission(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    (scene, lights): (&Scene, &Lights),
+    geometry: &Geometry,
+    index: u32,
+) -> DVec4 {
     let voxel = volume.grid().voxel_at(index);
+    let left = lights.left(volume.grid().world_position(voxel) / volume.grid().unit());
     let of_channel = |(volume, transfer): (&Volume, &TransferFunction)| match alpha(volume, transfer, index) {
         0.0 => DVec4::ZERO,
         alpha => {
@@ -58,41 +77,15 @@ pub fn emission(volume: &Volume, transfer: &TransferFunction, scene: &Scene, geo
             let base = volume.color(index).map_or_else(|| tables.color.at(value), DVec4::truncate);
             let gradient =
                 tables.members.map_or_else(|| volume.gradient(voxel), |of| membership::gradient(volume, of, voxel));
-            let color = color(scene, base, gradient, -geometry.ray(voxel));
+            let color = color(scene, base, gradient, -geometry.ray(voxel), left);
             color.extend(1.0) * amount(scene.splatting.compositing, alpha)
         }
     };
     channels(volume, transfer).map(of_channel).sum()
 }
 
-/// α of a voxel, times A where it has a colour of its own (SPEC §10); 0 for a hole.
-fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) -> f64 {
-    let value = f64::from(volume.values().at(index as usize));
-    let tables = transfer.tables(volume.label(index));
-    // Most voxels are excluded by their value, so the gradient is computed only if needed.
-    if value.is_nan() || tables.opacity.at(value) <= 0.0 {
-        return 0.0;
-    }
-    let own = volume.color(index).map_or(1.0, |color| color.w);
-    let voxel = volume.grid().voxel_at(index);
-    let gradient = match tables.members {
-        _ if tables.gradient_opacity.is_none() => DVec3::ZERO,
-        Some(of @ Members::OfValues) => membership::gradient(volume, of, voxel),
-        Some(Members::OfLabels) | None => volume.gradient(voxel),
-    };
-    tables.alpha(value, gradient.length()) * own
-}
-
-/// `m`: the amount per unit length (SPEC §5).
-pub fn amount(compositing: Compositing, alpha: f64) -> f64 {
-    match compositing {
-        Compositing::Exponential => -(-alpha.min(0.9999)).ln_1p(),
-        _ => alpha,
-    }
-}
-
-/// `C` of SPEC §3.
-pub fn color(Scene { shading, camera, .. }: &Scene, color: DVec3, gradient: DVec3, to_eye: DVec3) -> DVec3 {
+/// `C` of SPEC §3, with what light sheets leave of the light (SPEC §14).
+pub fn color(Scene { shading, camera, .. }: &Scene, color: DVec3, gradient: DVec3, to_eye: DVec3, left: Left) -> DVec3 {
     if !shading.enabled {
         return color;
     }
@@ -109,6 +102,6 @@ pub fn color(Scene { shading, camera, .. }: &Scene, color: DVec3, gradient: DVec
         0.0 => 0.0,
         cosine => shading.specular * cosine.powf(shading.shininess),
     };
-    let diffuse = shading.diffuse * normal.dot(to_light).abs();
-    (color * (shading.ambient + diffuse) + highlight).clamp(DVec3::ZERO, DVec3::ONE)
+    let diffuse = shading.diffuse * left.direct * normal.dot(to_light).abs();
+    (color * (shading.ambient * left.ambient + diffuse) + left.direct * highlight).clamp(DVec3::ZERO, DVec3::ONE)
 }

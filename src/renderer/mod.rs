@@ -19,10 +19,12 @@ use crate::gpu::counts;
 use crate::gpu::device::{self, DeviceError, DeviceRequirements};
 use crate::gpu::fault::scoped;
 use crate::gpu::layout::Brick;
+use crate::gpu::light_texture::LightTexture;
 use crate::gpu::options::RendererOptions;
 use crate::gpu::placement::Placement;
 use crate::gpu::targets::CompositingBuffer;
 use crate::gpu::timer::Timer;
+use crate::light::KeptLight;
 use crate::pass::first_hit::FirstHit;
 use crate::pass::join::Join;
 use crate::pass::resolve::Resolve;
@@ -178,7 +180,9 @@ impl Renderer {
         }
         let hits = if view.first_hit.is_some() { first.hit_bytes() } else { 0 };
         let buffers = timer.unwrap_or(0) + sizes(&limits, &buffers)?;
-        Ok(view.volume.estimate()? + lists + coefficients + compositing + drawn + hits + buffers)
+        let light = KeptLight::extent((view.volume.volume(), view.volume.transfer()), &view.scene, &view.camera())?;
+        let light = LightTexture::estimate(&limits, light)?;
+        Ok(view.volume.estimate()? + lists + coefficients + compositing + drawn + hits + buffers + light)
     }
 
     /// Records the drawing of the view's prepared frame into the view's own buffers, which [`Self::present`] and [`Self::draw`] read in this

@@ -10,6 +10,7 @@ use crate::error::RenderError;
 use crate::gpu::bindings::{BufferSpec, grown, written};
 use crate::gpu::classified_volume::{ClassifiedVolume, Layer};
 use crate::gpu::counts::{self, Staging};
+use crate::gpu::light_texture::{self, LightTexture};
 use crate::gpu::targets::{CompositingBuffer, no_surfaces};
 use crate::gpu::timer::Timer;
 use crate::gpu::uniforms;
@@ -55,7 +56,13 @@ impl Renderer {
         // Everything that can fail comes before anything is taken from the last frame.
         let (layers, joining) = view.volume.layers();
         let mut requests = self.requests(view, &layers, joining)?;
-        let SceneView { volume, scene, hiding, first_hit, frame, .. } = view;
+        let lights = view.lights()?;
+        let SceneView { volume, scene, hiding, first_hit, frame, light_texture, .. } = view;
+        *light_texture = match &lights {
+            Some(lights) => Some(LightTexture::renewed(device, queue, lights, light_texture.take())?),
+            None => None,
+        };
+        let light = light_texture.as_ref().map(|texture| &texture.view);
         let mut fallback = requests.iter_mut().find_map(|request| request.fallback.take());
         if let Some(needs) = needs_of(&requests[0]) {
             volume.show(needs);
@@ -86,7 +93,10 @@ impl Renderer {
             let old = old_layers.next().unwrap_or_default();
             let points = bytemuck::cast_slice(&request.ramps.points);
             let control_points = write(old.control_points, &control_points(request), points)?;
-            let values = frame_values(volume, request, scene);
+            let mut values = frame_values(volume, request, scene);
+            if let Some(lights) = &lights {
+                light_texture::note(&mut values, lights);
+            }
             let uniform = write(old.uniform, &frame_uniform(), bytemuck::bytes_of(&values))?;
             let inputs = FrameInputs {
                 device,
@@ -97,6 +107,7 @@ impl Renderer {
                 control_points: &control_points,
                 compositing: &compositing,
                 cut: cut_buffers,
+                light,
             };
             let was = old.drawing.as_ref().map(Drawing::rasterizer);
             let (drawing, of_layer, too_much) = self.draw_with(inputs, old.drawing)?;
@@ -151,7 +162,8 @@ impl Renderer {
             + joined.as_ref().map_or(0, Joined::gpu_bytes)
             + [&cut, &staging].map(Buffer::size).iter().sum::<u64>()
             + if first_hits.is_some() { first.hit_bytes() } else { 0 }
-            + timer.as_ref().map_or(0, Timer::gpu_bytes);
+            + timer.as_ref().map_or(0, Timer::gpu_bytes)
+            + light_texture.as_ref().map_or(0, |texture| texture.gpu_bytes);
         let image = joined.as_ref().map_or(&compositing, |joined| &joined.compositing);
         let resolve_groups = image.bands.iter().map(|band| self.resolve.bind(device, image_uniform, band)).collect();
         *frame = Some(PreparedFrame {

@@ -1,6 +1,6 @@
 //! A view: what is shown and how, and what the next frame can reuse. Every setter states its cost (§5.1).
 
-use std::sync::OnceLock;
+use std::sync::{Arc, OnceLock};
 
 use wgpu::{CommandEncoder, Device, Texture};
 
@@ -12,6 +12,8 @@ use crate::gpu::counts::PendingCounts;
 use crate::gpu::fault::scoped;
 use crate::gpu::gpu_volume::GpuVolume;
 use crate::gpu::hiding::Hiding;
+use crate::gpu::light_texture::LightTexture;
+use crate::light::{KeptLight, Lights};
 pub use crate::rasterizer::Prepared;
 use crate::renderer::pick::PendingPick;
 use crate::renderer::prepared_frame::{Drawing, PreparedFrame, PreparedLayer};
@@ -36,6 +38,9 @@ pub struct SceneView {
     /// What is drawn, if that is a part of the image (SPEC §11).
     pub(crate) window: Option<Window>,
     pub(crate) frame: Option<PreparedFrame>,
+    /// Light sheets and what they are made of (SPEC §14), and their copy on the GPU.
+    pub(crate) light: KeptLight,
+    pub(crate) light_texture: Option<LightTexture>,
     /// The box that the camera frames by default, once it was needed.
     pub(crate) extent: OnceLock<Option<Extent>>,
 }
@@ -56,7 +61,17 @@ impl SceneView {
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
         let splatting = &scene.splatting;
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, splatting))?;
-        Ok(Self { volume, scene, hiding: None, first_hit: None, window: None, frame: None, extent: OnceLock::new() })
+        Ok(Self {
+            volume,
+            scene,
+            hiding: None,
+            first_hit: None,
+            window: None,
+            frame: None,
+            light: KeptLight::default(),
+            light_texture: None,
+            extent: OnceLock::new(),
+        })
     }
 
     /// The settings. Its `volume` and `transfer` are those with which the view was made.
@@ -75,6 +90,12 @@ impl SceneView {
         }
         let extent = self.extent.get_or_init(|| self.scene.extent(self.volume.volume(), self.volume.transfer()));
         extent.map_or(camera, |extent| extent.fit(&camera, [image.width, image.height]))
+    }
+
+    /// The light sheets of the next frame, if its scene has any. Those that are still valid are not made again.
+    pub(crate) fn lights(&mut self) -> Result<Option<Arc<Lights>>, RenderError> {
+        let camera = self.camera();
+        self.light.lights((self.volume.volume(), self.volume.transfer()), &self.scene, &camera)
     }
 
     /// The volume, classified by the current transfer function.
@@ -124,7 +145,8 @@ impl SceneView {
         self.set_shading(Shading { light, ..self.scene.shading })
     }
 
-    /// Changes the material; voxels are shaded again.
+    /// Changes the material; voxels are shaded again. With [`Shading::occlusion`] or [`Shading::shadow`] the next frame makes light sheets on the CPU, and so
+    /// does every frame before which their light, the camera that it follows, the transfer function, cuts or the kernel change.
     ///
     /// # Errors
     /// If a setting is invalid; then nothing changes.

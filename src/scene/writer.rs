@@ -227,7 +227,8 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
 
 fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
     let default = Shading::default();
-    let Shading { enabled, ambient, diffuse, specular, shininess, light, gradient } = *shading;
+    let Shading { enabled, ambient, diffuse, specular, shininess, light, gradient, .. } = *shading;
+    let Shading { occlusion, occlusion_spread, shadow, shadow_spread, light_step, .. } = *shading;
     text.table("shading");
     if !(fitting.enabled && enabled == default.enabled) {
         text.line("enabled", enabled);
@@ -252,6 +253,17 @@ fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
     // A scene that does not state it leaves it to the volume.
     if gradient != Gradient::Auto {
         text.line("gradient", name_of(GRADIENTS, gradient));
+    }
+    // Scenes without light sheets stay as they were, and so do the fingerprints of their parts.
+    let of_light = [
+        ("occlusion", occlusion, default.occlusion),
+        ("occlusion_spread", occlusion_spread, default.occlusion_spread),
+        ("shadow", shadow, default.shadow),
+        ("shadow_spread", shadow_spread, default.shadow_spread),
+        ("light_step", light_step, default.light_step),
+    ];
+    for (key, stated, _) in of_light.into_iter().filter(|(_, stated, default)| stated != default) {
+        text.line(key, stated);
     }
 }
 

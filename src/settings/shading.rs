@@ -1,5 +1,7 @@
 //! Shading settings (SPEC §3). `shaders/shade.wgsl` computes the shading, `reference::shading` in f64.
 
+use std::ops::Bound;
+
 use glam::DVec3;
 
 use super::camera::ViewBasis;
@@ -7,6 +9,15 @@ use crate::error::setting::{Interval, SettingError, check_direction, scaled};
 
 /// Gradients shorter than this (value per world unit) have no direction (SPEC §3).
 pub const MIN_GRADIENT: f64 = 1e-12;
+
+/// The spreads of light, in `unit`s² per `unit`.
+pub(crate) const LIGHT_SPREAD: Interval = Interval::new(Bound::Included(0.0), Bound::Included(64.0));
+
+/// The steps of light sheets, in `unit`s.
+pub(crate) const LIGHT_STEP: Interval = Interval::new(Bound::Included(0.5), Bound::Included(16.0));
+
+/// Why light sheets of a volume that is streamed are refused, and what is allowed.
+pub(crate) const STREAMED_LIGHT: [&str; 2] = ["for a volume that is streamed", "0, or a volume that fits into memory"];
 
 /// The direction of the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,6 +79,16 @@ pub struct Shading {
     pub light: Light,
     /// The gradient that is used.
     pub gradient: Gradient,
+    /// How much of the ambient light matter keeps off that lies in front, in [0, 1] (SPEC §14).
+    pub occlusion: f64,
+    /// The variance, in `unit`s² per `unit` of its way, by which light spreads for [`Self::occlusion`], in [0, 64].
+    pub occlusion_spread: f64,
+    /// How much of the diffuse and specular light matter keeps off that lies towards the light, in [0, 1].
+    pub shadow: f64,
+    /// As [`Self::occlusion_spread`], for [`Self::shadow`]: the softness of shadows, in [0, 64].
+    pub shadow_spread: f64,
+    /// The distance of light sheets and the size of their pixels, in `unit`s, in [0.5, 16].
+    pub light_step: f64,
 }
 
 impl Default for Shading {
@@ -80,6 +101,11 @@ impl Default for Shading {
             shininess: 20.0,
             light: Light::Headlight,
             gradient: Gradient::Auto,
+            occlusion: 0.0,
+            occlusion_spread: 8.0,
+            shadow: 0.0,
+            shadow_spread: 0.5,
+            light_step: 2.0,
         }
     }
 }
@@ -90,14 +116,55 @@ impl Shading {
     /// # Errors
     /// If a number is not finite or out of its range, or the light's direction is 0.
     pub fn check(&self) -> Result<(), SettingError> {
-        let Self { enabled: _, ambient, diffuse, specular, shininess, light, gradient: _ } = *self;
+        let Self { enabled: _, ambient, diffuse, specular, shininess, light, gradient: _, .. } = *self;
+        let Self { occlusion, occlusion_spread, shadow, shadow_spread, light_step, .. } = *self;
         Interval::NOT_NEGATIVE.check("shading.ambient", ambient)?;
         Interval::NOT_NEGATIVE.check("shading.diffuse", diffuse)?;
         Interval::NOT_NEGATIVE.check("shading.specular", specular)?;
         Interval::POSITIVE.check("shading.shininess", shininess)?;
+        Interval::SHARE.check("shading.occlusion", occlusion)?;
+        LIGHT_SPREAD.check("shading.occlusion_spread", occlusion_spread)?;
+        Interval::SHARE.check("shading.shadow", shadow)?;
+        LIGHT_SPREAD.check("shading.shadow_spread", shadow_spread)?;
+        LIGHT_STEP.check("shading.light_step", light_step)?;
         match light {
             Light::Headlight | Light::UpperLeft => Ok(()),
             Light::Direction(direction) => check_direction("shading.light", direction),
         }
+    }
+
+    /// The key that asks for light sheets (SPEC §14), if one does and voxels are shaded.
+    pub(crate) fn light_key(&self) -> Option<&'static str> {
+        self.stated_light().filter(|_| self.enabled)
+    }
+
+    /// The key of light sheets that has no effect, and why: voxels are not shaded, or a spread has no amount.
+    pub(crate) fn idle_light(&self) -> Option<(&'static str, &'static str)> {
+        let default = Self::default();
+        if let Some(key) = self.stated_light().filter(|_| !self.enabled) {
+            return Some((key, "shading.enabled = false"));
+        }
+        if self.occlusion == 0.0 && self.occlusion_spread != default.occlusion_spread {
+            return Some(("shading.occlusion_spread", "shading.occlusion = 0"));
+        }
+        if self.shadow == 0.0 && self.shadow_spread != default.shadow_spread {
+            return Some(("shading.shadow_spread", "shading.shadow = 0"));
+        }
+        let is_idle = self.stated_light().is_none() && self.light_step != default.light_step;
+        is_idle.then_some(("shading.light_step", "shading.occlusion = 0 and shading.shadow = 0"))
+    }
+
+    fn stated_light(&self) -> Option<&'static str> {
+        if self.occlusion > 0.0 {
+            return Some("shading.occlusion");
+        }
+        (self.shadow > 0.0).then_some("shading.shadow")
+    }
+
+    /// Refuses light sheets where a way of drawing, in words, does not have them.
+    pub(crate) fn refuse_light(&self, by: &str, allowed: &str) -> Result<(), SettingError> {
+        let Some(key) = self.light_key() else { return Ok(()) };
+        let amount = if key == "shading.occlusion" { self.occlusion } else { self.shadow };
+        Err(SettingError::new(key, format!("{amount} {by}"), allowed))
     }
 }

@@ -7,6 +7,7 @@ mod clip_from_world;
 #[path = "../common/mod.rs"]
 mod common;
 mod comparisons;
+mod light;
 mod membership;
 mod native;
 mod scene;

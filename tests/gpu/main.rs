@@ -17,6 +17,7 @@ mod economies;
 mod faults;
 mod holes;
 mod labels;
+mod light;
 mod limits;
 mod lists;
 mod membership;

@@ -5,7 +5,7 @@ use sheetsplat::image::Image;
 use sheetsplat::internals::kernel::Kernel;
 use sheetsplat::internals::reference::composite::composite;
 use sheetsplat::internals::reference::footprint::Ray;
-use sheetsplat::internals::reference::{Buffer, Geometry, resolve, shading, sheets, splat};
+use sheetsplat::internals::reference::{Buffer, Geometry, Lights, resolve, shading, sheets, splat};
 use sheetsplat::scene::Scene;
 use sheetsplat::volume::{Volume, builtin};
 
@@ -58,7 +58,7 @@ fn without_low_pass(volume: &Volume, scene: &Scene) -> Image {
     let ray = Ray::new(geometry.basis.w, &geometry.basis, volume.grid().aspect());
     (geometry.footprint_from_pixels, geometry.amplitude) = (ray.footprint_from_units * geometry.pix, 1.0);
     let voxels = shading::taking_part(volume, &transfer, &geometry);
-    let splats = shading::splats(&voxels, volume, &transfer, scene, &geometry);
+    let splats = shading::splats(&voxels, volume, &transfer, (scene, &Lights::default()), &geometry);
     let mut acc = Buffer::new(scene.image.width, scene.image.height);
     for (k, bucket) in sheets::buckets(&voxels, &splats, &geometry, &kernel) {
         let in_sheet: Vec<_> = bucket.iter().map(|&index| splats[index as usize]).collect();

@@ -84,6 +84,8 @@ fn shared() -> [Layout; 17] {
             shading,
             background,
             gradient,
+            light_place,
+            light_stacks,
             dims,
             ramps,
             size,

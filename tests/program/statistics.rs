@@ -173,3 +173,24 @@ fn stats_count_the_sections_of_the_specification() {
     }
     assert!(failures.is_empty(), "sections, on screen, sheets, shaded:\n{}", failures.join("\n"));
 }
+
+/// Light sheets are counted where there are any, and a key of theirs that has no effect is named.
+#[test]
+fn light_sheets_are_counted_and_idle_keys_named() {
+    let folder = Folder::new();
+    for drawing in DRAWINGS {
+        let stats = folder.stats(&format!("{SMALL} {drawing} --set shading.occlusion=0.5"));
+        assert!(stats["light_ms"].as_f64().unwrap() > 0.0 && count(&stats, "light_bytes") > 1000, "{stats:#}");
+        let stats = folder.stats(&format!("{SMALL} {drawing}"));
+        assert_eq!(keys(&stats), STATS_KEYS, "{drawing}");
+    }
+    for (sets, key) in [
+        ("--set shading.occlusion=0.5 --set shading.enabled=false", "shading.occlusion has no effect"),
+        ("--set shading.shadow_spread=3", "shading.shadow_spread has no effect: shading.shadow = 0"),
+        ("--set shading.light_step=3", "shading.light_step has no effect"),
+    ] {
+        let run = folder.run(&format!("render {SMALL} {sets} --backend cpu -o idle.npy"));
+        run.assert_success();
+        assert_eq!(run.stderr.matches(key).count(), 1, "{sets}: {}", run.stderr);
+    }
+}

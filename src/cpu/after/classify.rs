@@ -355,7 +355,8 @@ impl Frame<'_> {
                 let [near, far] = gradients;
                 let share = means.share * part[1] + part[0];
                 let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * share);
-                color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
+                let left = self.left_between(simd, visible, (looks, planes), [column, row], share);
+                color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
                 if self.has_gradient_opacity {
                     let length = self.length(gradient);
                     let factors: [f32; LANES] = std::array::from_fn(|lane| {
@@ -380,7 +381,7 @@ impl Frame<'_> {
         amounts
     }
 
-    /// Colours shaded by gradients.
+    /// Colours shaded by gradients, in the light that is left.
     #[inline(always)]
     pub(super) fn shaded<S: Simd>(
         &self,
@@ -388,13 +389,14 @@ impl Frame<'_> {
         color: [f32x8<S>; 3],
         gradient: [f32x8<S>; 3],
         to_eye: [f32x8<S>; 3],
+        left: [f32x8<S>; 2],
     ) -> [f32x8<S>; 3] {
         let splat = |number: f32| f32x8::splat(simd, number);
         let [x, y, z] = gradient;
         let length = (x * x + y * y + z * z).sqrt();
         let is_flat = length.simd_lt(splat(self.min_gradient));
         let per_length = is_flat.select(splat(0.0), splat(-1.0) / is_flat.select(splat(1.0), length));
-        self.shader.color(simd, color, [x * per_length, y * per_length, z * per_length], to_eye)
+        self.shader.color(simd, color, [x * per_length, y * per_length, z * per_length], to_eye, left)
     }
 
     /// The length of gradients, values per world unit.

@@ -287,7 +287,8 @@ impl Frame<'_> {
         }
         let mut color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
         if !is_average {
-            color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
+            let left = self.left(simd, lanes, looks, [column, row], |lane| looks.rays.slab(places[lane]));
+            color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
         }
         let alpha = f32x8::load_array(simd, alphas);
         let [red, green, blue] = color.map(|channel| channel * alpha);

@@ -1,6 +1,7 @@
 //! A frame where classification comes after splatting: the data that its tiles share, and its tiles drawn on all cores.
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
 use fearless_simd::Level;
@@ -25,6 +26,7 @@ use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::cpu::simd::dispatch;
 use crate::geometry::pixel_ray::counted;
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::light::Lights;
 use crate::lists::brick;
 use crate::lists::brick::Brick;
 use crate::lists::quad_plan::tile_grid;
@@ -52,6 +54,8 @@ pub(in crate::cpu) struct Frame<'a> {
     pub(super) field: Field<'a>,
     pub(super) integrals: Integrals,
     pub(super) shader: Shader,
+    /// The light sheets of all channels, if there are any.
+    pub(super) lights: Option<Arc<Lights>>,
     pub(super) compositor: Compositor,
     /// After as many sheets opaque pixels are closed.
     pub(super) sheets_per_test: i32,
@@ -103,7 +107,7 @@ impl<'a> Frame<'a> {
         (matter, transfer): (Matter<'a>, &'a TransferFunction),
         scene: &Scene,
         view: ViewGeometry,
-        Host { window, is_part, first_hit, surfaces }: Host,
+        Host { window, is_part, first_hit, surfaces, lights }: Host,
     ) -> Self {
         let (splatting, shading, grid) = (&scene.splatting, &scene.shading, matter.grid());
         let Window { slabs, region } = window;
@@ -138,6 +142,7 @@ impl<'a> Frame<'a> {
             numbers,
             integrals: Integrals::new(labelled.is_some(), transfer, splatting, &matter.all_numbers()),
             shader: Shader::new(shading, &scene.camera.basis(), splatting.compositing),
+            lights,
             compositor: Compositor {
                 compositing: splatting.compositing,
                 order: Order::FrontToBack,

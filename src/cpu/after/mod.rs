@@ -21,6 +21,7 @@ mod extreme;
 mod field;
 mod frame;
 mod held;
+mod light;
 mod low_pass;
 mod matter;
 mod needs;

@@ -102,7 +102,8 @@ impl Frame<'_> {
         let [near, far] = lines;
         let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * place);
         let color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
-        let [red, green, blue] = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]));
+        let left = self.left_between(simd, found, (looks, planes), [column, row], place);
+        let [red, green, blue] = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
         let is_found = mask(simd, found);
         let put = |pixels: &mut [f32], new: f32x8<S>| {
             let old = f32x8::from_slice(simd, pixels);

@@ -29,6 +29,7 @@ use crate::rendering::Rendering;
 use crate::scene::Scene;
 use crate::scene::open::CHUNKS_OF_THREAD;
 use crate::settings::camera::Camera;
+use crate::settings::shading::STREAMED_LIGHT;
 use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
@@ -164,7 +165,7 @@ impl StreamRenderer {
         let (size, grid) = (view.size, *self.volume.grid());
         let threads = self.threads();
         let stream = Arc::new(self.stream((scene, view), &window)?);
-        let host = Host { window, is_part, first_hit: None, surfaces: None };
+        let host = Host { window, is_part, first_hit: None, surfaces: None, lights: None };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
             Classification::After => {
                 let nothing = Volume::piece(grid.resized(UVec3::ZERO), Values::default());
@@ -278,6 +279,7 @@ fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFun
     scene.check_volume(sample)?;
     check(scene)?;
     scene.check_streamed(volume)?;
+    scene.shading.refuse_light(STREAMED_LIGHT[0], STREAMED_LIGHT[1])?;
     let settled = scene.settled(sample);
     let transfer = settled.resolve(sample);
     Ok((Scene { splatting: settled.splatting.streamed(), ..settled }, transfer))

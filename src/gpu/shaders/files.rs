@@ -40,7 +40,7 @@ macro_rules! files {
 }
 
 /// Every file. Only those that stages are assembled from are in a program.
-pub(super) const FILES: &[File; 84] = files![
+pub(super) const FILES: &[File; 85] = files![
     "classify" "clear" "compact" "composite" "cull_bricks" "cull_voxels" "field" "field_colors" "first_hit" "gather"
     "gather_planes" "join" "occlude" "resolve" "sample" "shade" "splat" "splat_perspective" "tiles" "values"
     "gather/amounts" "gather/bits" "gather/economic_kernel" "gather/economies" "gather/group" "gather/kernel"
@@ -50,7 +50,7 @@ pub(super) const FILES: &[File; 84] = files![
     "gather/workgroup_barrier" "gather/workgroup_lanes" "gather/workgroup_main"
     "shared/band" "shared/brick" "shared/cells" "shared/channels" "shared/colors" "shared/compositing"
     "shared/corners" "shared/culled" "shared/cut" "shared/exact" "shared/field_voxel" "shared/finished"
-    "shared/first_surface" "shared/footprints" "shared/frame" "shared/gradient" "shared/local_ray" "shared/means"
+    "shared/first_surface" "shared/footprints" "shared/frame" "shared/gradient" "shared/light" "shared/local_ray" "shared/means"
     "shared/number" "shared/opaque" "shared/own_color" "shared/plane_quads" "shared/planes" "shared/project"
     "shared/ramps" "shared/scan" "shared/seen" "shared/shading" "shared/sheets" "shared/slab" "shared/slab_integral" "shared/splat"
     "shared/splatted_color" "shared/tally" "shared/texels" "shared/tile_list" "shared/turned_quads" "shared/volume"

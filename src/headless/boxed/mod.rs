@@ -30,6 +30,7 @@ use crate::part::{self, Content, Extreme, Identity, MergeError, Part};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
+use crate::settings::shading::STREAMED_LIGHT;
 use crate::settings::splatting::{Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
@@ -271,6 +272,7 @@ fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(),
     check_grids((&volume.first, &volume.further))?;
     scene.check_volume(&volume.sample)?;
     scene.check_streamed(volume)?;
+    scene.shading.refuse_light(STREAMED_LIGHT[0], STREAMED_LIGHT[1])?;
     #[cfg(feature = "cpu")]
     if backend == Backend::Cpu {
         crate::cpu::check(scene)?;

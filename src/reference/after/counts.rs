@@ -5,6 +5,7 @@
 //! A slab needs both of its planes, and each plane all of its voxels.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DVec3, UVec2, UVec3};
 
@@ -44,7 +45,8 @@ struct Reach {
 /// # Errors
 /// If the scene needs more than can be computed.
 pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
-    Ok(count_in(&Frame::of_channels(Host::default(), volume, transfer, scene)?))
+    // Counts do not depend on light.
+    Ok(count_in(&Frame::of_channels(Host::default(), volume, transfer, (scene, Some(&Arc::default())))?))
 }
 
 /// The counts of the frames of all channels, each of whose fields is drawn by itself. No voxel is shaded, because pixels are shaded instead.

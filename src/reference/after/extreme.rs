@@ -45,7 +45,7 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
         base.extend(1.0) * alpha * opacity
     } else {
         let alpha = tables.alpha(value, gradient.length());
-        shading::color(scene, base, gradient, pixel.to_eye()).extend(1.0) * alpha * opacity
+        shading::color(scene, base, gradient, pixel.to_eye(), pixel.left(sheet)).extend(1.0) * alpha * opacity
     };
     let first_hit = pixel.frame().host.first_hit.filter(|&opacity| color.w >= opacity).map(|_| sheet);
     Composited { color, first_hit, extreme: Extreme { value: kept as f32, counted, label: 0.0 }, own }

@@ -1,6 +1,7 @@
 //! What the stages of a channel share.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -8,7 +9,7 @@ use super::field::Field;
 use super::low_pass::LowPass;
 use crate::error::RenderError;
 use crate::lists::classify::channels;
-use crate::reference::{Geometry, Host};
+use crate::reference::{Geometry, Host, Lights};
 use crate::scene::Scene;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::Window;
@@ -25,6 +26,8 @@ pub struct Frame<'a> {
     pub(super) slabs: Range<i32>,
     pub(super) geometry: Geometry,
     pub(super) field: Field<'a>,
+    /// Those of all channels.
+    pub(super) lights: Arc<Lights>,
 }
 
 impl<'a> Frame<'a> {
@@ -38,10 +41,22 @@ impl<'a> Frame<'a> {
         transfer: &'a TransferFunction,
         scene: &Scene,
     ) -> Result<Self, RenderError> {
+        Self::lit(host, volume, transfer, (scene, None))
+    }
+
+    /// [`Self::new`]; `lights` are those of all channels, where one of them is drawn by itself.
+    fn lit(
+        host: Host<'a>,
+        volume: &'a Volume,
+        transfer: &'a TransferFunction,
+        (scene, lights): (&Scene, Option<&Arc<Lights>>),
+    ) -> Result<Self, RenderError> {
         scene.check()?;
         transfer.check()?;
         host.check(scene)?;
-        Self::of_channel(host, volume, transfer, scene.framed(volume, transfer))
+        let scene = scene.framed(volume, transfer);
+        let lights = Lights::or_new(lights, volume, transfer, &scene)?;
+        Self::of_channel(host, volume, transfer, (scene, lights))
     }
 
     /// Those of all channels, which share everything that depends on the view.
@@ -52,12 +67,12 @@ impl<'a> Frame<'a> {
         host: Host<'a>,
         volume: &'a Volume,
         transfer: &'a TransferFunction,
-        scene: &Scene,
+        (scene, lights): (&Scene, Option<&Arc<Lights>>),
     ) -> Result<Vec<Self>, RenderError> {
-        let first = Self::new(host, volume, transfer, scene)?;
-        let scene = first.scene.clone();
+        let first = Self::lit(host, volume, transfer, (scene, lights))?;
+        let of = (first.scene.clone(), Arc::clone(&first.lights));
         let further = channels(volume, transfer).skip(1);
-        let further = further.map(|(volume, transfer)| Self::of_channel(host, volume, transfer, scene.clone()));
+        let further = further.map(|(volume, transfer)| Self::of_channel(host, volume, transfer, of.clone()));
         std::iter::once(Ok(first)).chain(further).collect()
     }
 
@@ -65,11 +80,11 @@ impl<'a> Frame<'a> {
         host: Host<'a>,
         volume: &'a Volume,
         transfer: &'a TransferFunction,
-        scene: Scene,
+        (scene, lights): (Scene, Arc<Lights>),
     ) -> Result<Self, RenderError> {
         let geometry = Geometry::new(volume.grid(), &scene)?;
         let field = Field::new(volume, &scene)?;
-        Ok(Self { volume, transfer, scene, host, slabs: Window::ALL_SLABS, geometry, field })
+        Ok(Self { volume, transfer, scene, host, slabs: Window::ALL_SLABS, geometry, field, lights })
     }
 
     /// The view's geometry.

@@ -26,9 +26,11 @@ pub mod pixel;
 pub mod slab_integral;
 mod surface;
 
+use std::sync::Arc;
+
 use glam::{DVec4, UVec2};
 
-use super::{Areas, Buffer, Culled, Host, resolve};
+use super::{Areas, Buffer, Culled, Host, Lights, resolve};
 use crate::error::RenderError;
 use crate::image::channels::Joining;
 use crate::parallel::prelude::*;
@@ -90,10 +92,10 @@ fn each_place_in<T: Send>(region: &Region, of: impl Fn(UVec2) -> T + Sync) -> Ve
 fn composite_window(
     host: Host<'_>,
     (volume, transfer): (&Volume, &TransferFunction),
-    scene: &Scene,
+    (scene, lights): (&Scene, Option<&Arc<Lights>>),
     Window { slabs, region }: &Window,
 ) -> Result<Vec<Composited>, RenderError> {
-    let mut frames = Frame::of_channels(host, volume, transfer, scene)?;
+    let mut frames = Frame::of_channels(host, volume, transfer, (scene, lights))?;
     frames.iter_mut().for_each(|frame| frame.slabs = slabs.clone());
     Ok(composite(&frames, region))
 }
@@ -107,10 +109,11 @@ pub(super) fn nearest_part(
 ) -> Result<Content, RenderError> {
     // All channels share a camera.
     let scene = scene.framed(volume, transfer);
+    let lights = Arc::new(Lights::new(volume, transfer, &scene)?);
     let host = Host { first_hit: Some(1.0), ..Host::default() };
     let (mut colors, mut hits) = (vec![[0.0; 4]; window.region.pixels()], vec![f64::INFINITY; window.region.pixels()]);
     for (number, channel) in volume.channels().enumerate().take(1 + transfer.further.len()) {
-        let pixels = composite_window(host, (channel, &transfer.of_channel(number)), &scene, window)?;
+        let pixels = composite_window(host, (channel, &transfer.of_channel(number)), (&scene, Some(&lights)), window)?;
         let own = pixels.iter().map(|pixel| pixel.color.as_vec4().to_array()).collect::<Vec<_>>();
         let own_hits = pixels.iter().map(|pixel| pixel.first_hit.unwrap_or(f64::INFINITY)).collect::<Vec<_>>();
         Joining::Nearest.join((&mut colors, &mut hits), (&own, &own_hits));
@@ -126,7 +129,7 @@ pub(super) fn part(
     scene: &Scene,
     window: &Window,
 ) -> Result<Content, RenderError> {
-    let pixels = composite_window(Host::default(), (volume, transfer), scene, window)?;
+    let pixels = composite_window(Host::default(), (volume, transfer), (scene, None), window)?;
     let compositing = scene.splatting.compositing;
     let is_mean = |pixel: &Composited| compositing == Compositing::Average && pixel.extreme.counted > Extreme::MIDDLE;
     // Means are classified where parts are merged.
@@ -147,7 +150,17 @@ pub fn render_for(
     transfer: &TransferFunction,
     scene: &Scene,
 ) -> Result<Culled, RenderError> {
-    let frames = Frame::of_channels(host, volume, transfer, scene)?;
+    render_lit(host, volume, transfer, (scene, None))
+}
+
+/// [`render_for`]; `lights` are those of all channels, where one of them is drawn by itself.
+pub(super) fn render_lit(
+    host: Host<'_>,
+    volume: &Volume,
+    transfer: &TransferFunction,
+    (scene, lights): (&Scene, Option<&Arc<Lights>>),
+) -> Result<Culled, RenderError> {
+    let frames = Frame::of_channels(host, volume, transfer, (scene, lights))?;
     let pixels = composite(&frames, &Region::whole([scene.image.width, scene.image.height]));
     let acc = Buffer { width: scene.image.width as usize, pixels: pixels.iter().map(|pixel| pixel.color).collect() };
     // Sums are clamped; the other modes already give premultiplied RGBA.

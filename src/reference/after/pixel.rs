@@ -10,6 +10,7 @@ use super::slab_integral::SlabIntegral;
 use crate::geometry::pixel_ray::HAIR_OF_CELL;
 use crate::part::Extreme;
 use crate::reference::cut::{self, PixelRay};
+use crate::reference::light::Left;
 use crate::reference::means::volume_box;
 use crate::reference::shading;
 use crate::settings::splatting::SlabProfile;
@@ -123,8 +124,17 @@ impl<'a> Pixel<'a> {
     /// The voxel coordinates of a position on the ray.
     pub fn at(&self, sheet: f64) -> DVec3 {
         let geometry = &self.frame.geometry;
-        let position = self.ray.origin + self.ray.depth(geometry, sheet) * self.ray.along;
-        position / geometry.grid.aspect() + geometry.grid.center()
+        self.position(sheet) / geometry.grid.aspect() + geometry.grid.center()
+    }
+
+    /// A position on the ray, in `unit`s from the grid's centre.
+    fn position(&self, sheet: f64) -> DVec3 {
+        self.ray.origin + self.ray.depth(&self.frame.geometry, sheet) * self.ray.along
+    }
+
+    /// What is left of light at a position on the ray.
+    pub(super) fn left(&self, sheet: f64) -> Left {
+        self.frame.lights.left(self.position(sheet))
     }
 
     /// The unit vector towards the eye.
@@ -244,9 +254,10 @@ impl<'a> Pixel<'a> {
                 (amount, color) = (amount * own.w, own.truncate());
             }
             if let Some([near, far]) = gradients {
-                let gradient = near.lerp(far, ends[0] + (ends[1] - ends[0]) * means.share);
+                let place = ends[0] + (ends[1] - ends[0]) * means.share;
+                let gradient = near.lerp(far, place);
                 amount *= tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient.length()));
-                color = shading::color(scene, color, gradient, self.to_eye());
+                color = shading::color(scene, color, gradient, self.to_eye(), self.left(first + place));
             }
             let length = (part.end - part.start) * self.length_per_sheet;
             (part, color.extend(1.0) * amount * length)

@@ -53,7 +53,7 @@ fn in_slab(pixel: &Pixel, slab: &Slab) -> Option<Composited> {
             if let Some(t) = line.first_surface(&gradient) {
                 let scene = &pixel.frame().scene;
                 let base = own.map_or_else(|| tables.color.at(value(t)), DVec4::truncate);
-                let color = shading::color(scene, base, gradient(t), pixel.to_eye()).extend(1.0);
+                let color = shading::color(scene, base, gradient(t), pixel.to_eye(), pixel.left(first + t)).extend(1.0);
                 return Some(Composited::new(color, pixel.frame().host.first_hit.map(|_| first + t)));
             }
         }

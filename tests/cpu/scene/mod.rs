@@ -122,6 +122,11 @@ fn every_key() {
         specular = 3
         shininess = 0.5
         gradient = "kernel"
+        occlusion = 0.75
+        occlusion_spread = 3
+        shadow = 1
+        shadow_spread = 0
+        light_step = 0.5
         [splatting]
         method = "axis-aligned"
         radius = 1
@@ -197,6 +202,11 @@ fn every_key() {
             shininess: 0.5,
             light: Light::Direction(DVec3::new(0.0, 0.0, 2.0)),
             gradient: Gradient::Kernel,
+            occlusion: 0.75,
+            occlusion_spread: 3.0,
+            shadow: 1.0,
+            shadow_spread: 0.0,
+            light_step: 0.5,
         },
         splatting: Splatting {
             method: Method::AxisAligned,

@@ -160,6 +160,11 @@ const REFUSED: &[(&str, &str, &str, &str, &str)] = &[
     ("shading.diffuse", "inf", "shading.diffuse", "inf", "a finite number >= 0"),
     ("shading.specular", "'a'", "shading.specular", "\"a\" (string)", "a finite number >= 0"),
     ("shading.shininess", "0", "shading.shininess", "0", "a finite number > 0"),
+    ("shading.occlusion", "1.5", "shading.occlusion", "1.5", "a number in [0, 1]"),
+    ("shading.occlusion_spread", "-1", "shading.occlusion_spread", "-1", "a number in [0, 64]"),
+    ("shading.shadow", "nan", "shading.shadow", "nan", "a number in [0, 1]"),
+    ("shading.shadow_spread", "65", "shading.shadow_spread", "65", "a number in [0, 64]"),
+    ("shading.light_step", "0.4", "shading.light_step", "0.4", "a number in [0.5, 16]"),
     (
         "shading.glossy",
         "0",

@@ -145,7 +145,7 @@ fn shaded(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) -> usiz
 
     let geometry = Geometry::new(volume.grid(), scene).unwrap();
     let taking_part = shading::taking_part(volume, &transfer, &geometry);
-    let expected = shading::shade(volume, &transfer, scene, &geometry);
+    let expected = shading::shade(volume, &transfer, scene, &geometry).unwrap();
     let twins: BTreeMap<u32, &shading::Splat> = taking_part.iter().copied().zip(&expected).collect();
     let held: usize = culling.bricks.iter().map(|brick| brick::voxels(brick).count()).sum();
     assert_eq!(held, voxels.len(), "{name}: bricks hold every voxel");

@@ -90,6 +90,8 @@ pub(super) fn shading(ui: &mut Ui, shading: &mut Shading, classification: Classi
     slider(ui, &mut shading.ambient, 0.0..=1.0, "ambient");
     slider(ui, &mut shading.diffuse, 0.0..=1.0, "diffuse");
     slider(ui, &mut shading.specular, 0.0..=1.0, "specular");
+    slider(ui, &mut shading.occlusion, 0.0..=1.0, "occlusion");
+    slider(ui, &mut shading.shadow, 0.0..=1.0, "shadow");
 }
 
 /// The last frame's statistics.

@@ -79,6 +79,7 @@ fn classified(prepared: &Prepared<'_>, twin: &Frame<'_>, rays: Rays<'_>) -> (Vec
     let hits = init(device, &vec![0_u32; pixels], BufferUsages::STORAGE);
     let stage = Classify::new(device);
     let buffers = ClassifyBuffers {
+        light: None,
         composite: CompositeBuffers {
             frame: &prepared.frame,
             groups: &groups,
@@ -95,6 +96,7 @@ fn classified(prepared: &Prepared<'_>, twin: &Frame<'_>, rays: Rays<'_>) -> (Vec
         labels: labels.as_ref().map(|texture| &texture.view),
     };
     let mode = ClassifyMode {
+        light: false,
         composite: CompositeMode { compositing: scene.splatting.compositing, rays: rays.mode(scene) },
         gradient: scene.shading.gradient,
         labels: labels.is_some(),

@@ -72,6 +72,7 @@ fn any_list(prepared: &Prepared<'_>) -> CullList {
     let any = |usage| init(device, &[0_u8; 1024], usage);
     let (storage, uniform) = (any(BufferUsages::STORAGE), any(BufferUsages::UNIFORM));
     let buffers = CullBuffers {
+        light: None,
         frame: &uniform,
         groups: &uniform,
         values: &VolumeTexture::upload(device, prepared.gpu.queue(), ValueSlice::F32(&[0.0])).unwrap().view,

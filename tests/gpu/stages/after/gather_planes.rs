@@ -108,6 +108,7 @@ fn gathered(prepared: &Prepared<'_>, stage: &Gather, first_hit: Option<f64>, ban
         .is_exact()
         .then(|| VolumeTexture::upload_bits(device, queue, &super::values::numbers_of(prepared)).unwrap());
     let buffers = GatherBuffers {
+        light: None,
         frame: &prepared.frame,
         gather: &init(device, &[gather], BufferUsages::UNIFORM),
         planes: Some(GatheredPlanes {

@@ -109,6 +109,7 @@ impl<'a> Culling<'a> {
         let culled = init(device, &bytes, BufferUsages::STORAGE);
         let labels = labels.map(|labels| VolumeTexture::upload_labels(device, gpu.queue(), labels).unwrap());
         let shared = CullBuffers {
+            light: None,
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             groups: &groups,
             values: &uploaded.view,

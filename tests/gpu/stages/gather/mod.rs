@@ -120,6 +120,7 @@ impl<'a> Fixture<'a> {
             bins.workgroups,
         );
         let buffers = GatherBuffers {
+            light: None,
             frame: &init(device, &[frame], BufferUsages::UNIFORM),
             gather: &init(device, &[gather], BufferUsages::UNIFORM),
             planes: None,

@@ -47,6 +47,7 @@ impl<'a> Stages<'a> {
         let storage = any(BufferUsages::STORAGE);
         let uniform = any(BufferUsages::UNIFORM);
         let shared = CullBuffers {
+            light: None,
             frame: &uniform,
             groups: &uniform,
             values: &VolumeTexture::upload(device, gpu.queue(), ValueSlice::F32(&[0.0])).unwrap().view,

@@ -1,0 +1,172 @@
+//! What a view keeps of its light from frame to frame: the matter while the transfer function and the cuts stay, and each stack of sheets while its light does.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use web_time::Instant;
+
+use super::lights::Lights;
+use super::matter::LightMatter;
+#[cfg(feature = "gpu")]
+use super::matter::lit_bricks;
+use super::sheets::LightSheets;
+use super::view::LightView;
+use crate::error::RenderError;
+use crate::kernel::Kernel;
+#[cfg(feature = "gpu")]
+use crate::lists::quad_plan::Overlaps;
+use crate::scene::Scene;
+use crate::settings::camera::Camera;
+use crate::settings::clip::Clip;
+use crate::settings::shading::Shading;
+use crate::settings::transfer_function::TransferFunction;
+#[cfg(any(feature = "cpu", feature = "gpu"))]
+use crate::stats::Stats;
+use crate::volume::Volume;
+
+/// The light of a view of one volume.
+#[derive(Clone, Debug, Default)]
+pub struct KeptLight {
+    matter: Option<KeptMatter>,
+    /// Those of occlusion and of shadow.
+    sheets: [Option<(Source, Arc<LightSheets>)>; 2],
+    /// Milliseconds that the last call took.
+    milliseconds: f64,
+}
+
+/// Matter, and what it depends on.
+#[derive(Clone, Debug)]
+struct KeptMatter {
+    transfer: TransferFunction,
+    clip: Clip,
+    matter: LightMatter,
+}
+
+/// What a stack of sheets depends on besides the matter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Source {
+    /// The unit vector to the light.
+    to_light: DVec3,
+    /// The camera's.
+    up: DVec3,
+    spread: f64,
+    step: f64,
+    /// Radius and falloff.
+    kernel: [f64; 2],
+}
+
+impl KeptLight {
+    /// The light sheets of a scene with a camera that is framed, always of the same volume; `None` without occlusion, shadow or shading. What has not
+    /// changed since the last call is not made again.
+    ///
+    /// # Errors
+    /// If sheets would take more than 4 GiB.
+    pub fn lights(
+        &mut self,
+        (volume, transfer): (&Volume, &TransferFunction),
+        scene: &Scene,
+        camera: &Camera,
+    ) -> Result<Option<Arc<Lights>>, RenderError> {
+        let start = Instant::now();
+        if scene.shading.light_key().is_none() {
+            *self = Self::default();
+            return Ok(None);
+        }
+        let is_same = |kept: &KeptMatter| kept.transfer == *transfer && kept.clip == scene.clip;
+        let matter = match self.matter.take().filter(is_same) {
+            Some(kept) => kept,
+            None => {
+                self.sheets = [None, None];
+                let matter = LightMatter::new(volume, transfer, &scene.clip);
+                KeptMatter { transfer: transfer.clone(), clip: scene.clip.clone(), matter }
+            }
+        };
+        let matter = &self.matter.insert(matter).matter;
+        let Shading { occlusion, shadow, .. } = scene.shading;
+        let wanted = sources(scene, camera);
+        // What nobody else holds any more is memory for new sheets.
+        let mut memory = [Vec::new(), Vec::new()];
+        for ((kept, wanted), memory) in self.sheets.iter_mut().zip(wanted).zip(&mut memory) {
+            let old = kept.take_if(|(source, _)| Some(*source) != wanted);
+            *memory = old.and_then(|(_, sheets)| Arc::into_inner(sheets)).map_or_else(Vec::new, |sheets| sheets.light);
+        }
+        let is_missing = |number: usize| wanted[number].filter(|_| self.sheets[number].is_none());
+        let missing = [is_missing(0), is_missing(1)];
+        let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
+        let view = |source: &Source| LightView::new(&matter.grid, scene, camera.up, source.to_light);
+        let variance = |source: &Source| source.spread / source.step;
+        match missing {
+            // Both take the same amounts.
+            [Some(first), Some(second)] if first.to_light == second.to_light => {
+                let variances = [variance(&first), variance(&second)];
+                let [a, b] = LightSheets::new(matter, &view(&first)?, &kernel, variances, memory);
+                self.sheets = [Some((first, Arc::new(a))), Some((second, Arc::new(b)))];
+            }
+            missing => {
+                for ((kept, source), memory) in self.sheets.iter_mut().zip(missing).zip(memory) {
+                    if let Some(source) = source {
+                        let [sheets] =
+                            LightSheets::new(matter, &view(&source)?, &kernel, [variance(&source)], [memory]);
+                        *kept = Some((source, Arc::new(sheets)));
+                    }
+                }
+            }
+        }
+        let of = |number: usize, amount: f64| {
+            self.sheets[number].as_ref().map(|(_, sheets)| (amount as f32, Arc::clone(sheets)))
+        };
+        let lights = Lights { occlusion: of(0, occlusion), shadow: of(1, shadow) };
+        self.milliseconds = start.elapsed().as_secs_f64() * 1e3;
+        Ok(Some(Arc::new(lights)))
+    }
+
+    /// The pixels along each side of the sheets that [`Self::lights`] would give, and the number of planes of both stacks; 0 without occlusion, shadow or
+    /// shading.
+    ///
+    /// # Errors
+    /// As for [`Self::lights`].
+    #[cfg(feature = "gpu")]
+    pub(crate) fn extent(
+        (volume, transfer): (&Volume, &TransferFunction),
+        scene: &Scene,
+        camera: &Camera,
+    ) -> Result<[u32; 2], RenderError> {
+        let wanted = sources(scene, camera);
+        if wanted.iter().flatten().next().is_none() {
+            return Ok([0; 2]);
+        }
+        let bricks = lit_bricks(volume, transfer, &scene.clip);
+        let [mut side, mut planes] = [0; 2];
+        for source in wanted.iter().flatten() {
+            let light = LightView::new(volume.grid(), scene, camera.up, source.to_light)?;
+            let slabs = Overlaps::count(bricks.bricks(), &light.view).slabs.len() as u32;
+            (side, planes) = (light.side as u32, planes + if slabs > 0 { slabs + 1 } else { 0 });
+        }
+        Ok([side, planes])
+    }
+
+    /// A frame's statistics with those of its light sheets, if it has any.
+    #[cfg(any(feature = "cpu", feature = "gpu"))]
+    pub(crate) fn noted_in(&self, stats: Stats) -> Stats {
+        let sheets = self.sheets.iter().flatten().map(|(_, sheets)| sheets);
+        let bytes: u64 = sheets.map(|sheets| size_of_val(&sheets.light[..]) as u64).sum();
+        if self.matter.is_none() {
+            return stats;
+        }
+        Stats { light_ms: Some(self.milliseconds), light_bytes: Some(bytes), ..stats }
+    }
+}
+
+/// What the stacks of occlusion and of shadow depend on, as far as a scene with a framed camera has them.
+fn sources(scene: &Scene, camera: &Camera) -> [Option<Source>; 2] {
+    let Shading { occlusion, occlusion_spread, shadow, shadow_spread, light_step: step, light, .. } = scene.shading;
+    let basis = camera.basis();
+    let front = -basis.w;
+    let source = |(amount, spread, to_light): (f64, f64, DVec3)| {
+        let kernel = [scene.splatting.radius, scene.splatting.falloff];
+        let is_wanted = amount > 0.0 && scene.shading.enabled;
+        is_wanted.then_some(Source { to_light, up: camera.up, spread, step, kernel })
+    };
+    let to_light = light.direction(&basis).unwrap_or(front);
+    [(occlusion, occlusion_spread, front), (shadow, shadow_spread, to_light)].map(source)
+}

@@ -1,0 +1,138 @@
+//! Light sheets (SPEC §14): `T_{k+1} = B(T_k·exp(-a_k))` slab by slab, and T at a point.
+
+use glam::{DVec3, DVec4};
+
+use super::box_filter::{Area, BoxFilter};
+use super::lit::Lit;
+use super::matter::LightMatter;
+use super::splat::Splatter;
+use super::view::LightView;
+use crate::kernel::Kernel;
+use crate::lists::quad_plan::Overlaps;
+use crate::parallel::prelude::*;
+
+/// The light that each plane gets from one direction.
+#[derive(Clone, Debug)]
+pub struct LightSheets {
+    rows: [DVec4; 3],
+    /// The pixels along each side of a plane.
+    pub side: usize,
+    /// The number of the first plane, before the first slab that any kernel touches.
+    pub first: i32,
+    planes: usize,
+    /// T, plane by plane and row by row: a plane more than there are slabs. Empty if no voxel takes part.
+    pub light: Vec<f32>,
+}
+
+/// Sheets while they are made.
+struct Growing {
+    filter: BoxFilter,
+    /// The pixels of the last plane that may have lost light.
+    area: Area,
+    light: Vec<f32>,
+}
+
+impl LightSheets {
+    /// The sheets of a view, for each spread given as a variance in pixels² per slab, in memory that may be used again.
+    pub(super) fn new<const N: usize>(
+        matter: &LightMatter,
+        light: &LightView,
+        kernel: &Kernel,
+        variances: [f64; N],
+        mut memory: [Vec<f32>; N],
+    ) -> [Self; N] {
+        let slabs = Overlaps::count(&matter.bricks, &light.view).slabs;
+        let ([x, y, plane], side) = (light.place, light.side);
+        let rows = [x, y, plane - DVec4::W * f64::from(slabs.start)];
+        if slabs.is_empty() {
+            return variances.map(|_| Self { rows, side, first: 0, planes: 0, light: Vec::new() });
+        }
+        let (pixels, count) = (side * side, slabs.len());
+        let mut number = 0;
+        let mut stacks = variances.map(|variance| {
+            let mut light = std::mem::take(&mut memory[number]);
+            number += 1;
+            light.resize(pixels * (count + 1), 1.0);
+            light.par_chunks_mut(pixels).for_each(|plane| plane.fill(1.0));
+            Growing { filter: BoxFilter::new(variance), area: Area::NONE, light }
+        });
+        let splatter = Splatter::new(matter, light, kernel, slabs.start);
+        let (mut passed, mut along_x) = (vec![1.0; pixels], vec![0.0; pixels]);
+        for k in 0..count {
+            let planes = stacks.each_ref().map(|stack| &stack.light[k * pixels..(k + 1) * pixels]);
+            let lit = Lit::of(&planes, side);
+            let touched = splatter.slab(k, &lit, &mut passed);
+            for Growing { filter, area, light } in &mut stacks {
+                *area = area.and(touched).grown(filter.reach(), side);
+                if area.is_empty() {
+                    continue;
+                }
+                let (before, after) = light.split_at_mut((k + 1) * pixels);
+                filter.spread(side, *area, (&before[k * pixels..], &passed), &mut along_x, &mut after[..pixels]);
+            }
+        }
+        stacks.map(|stack| Self { rows, side, first: slabs.start, planes: count + 1, light: stack.light })
+    }
+
+    /// The number of planes; 0 if no voxel takes part.
+    pub fn planes(&self) -> usize {
+        self.planes
+    }
+
+    /// Rows whose products with voxel coordinates (i, j, k, 1) are where a point is looked up: in pixels right of the first one's centre and below it, and in
+    /// planes from the first one on.
+    pub fn rows(&self) -> [DVec4; 3] {
+        self.rows
+    }
+
+    /// T at a point in voxel coordinates.
+    pub fn at(&self, voxel: DVec3) -> f32 {
+        self.at_place(self.rows().map(|row| row.dot(voxel.extend(1.0)) as f32))
+    }
+
+    /// T at a place as [`Self::rows`] gives it: bilinear between pixel centres, 1 beyond the image, linear between planes, and that of the first and the last
+    /// plane beyond them.
+    pub fn at_place(&self, [x, y, plane]: [f32; 3]) -> f32 {
+        let Some(last) = self.planes().checked_sub(1) else { return 1.0 };
+        let plane = plane.clamp(0.0, last as f32);
+        // Casts round towards 0, which is down from here on.
+        let near = plane as usize;
+        let far = (near + 1).min(last);
+        let [a, b] = match x >= 0.0 && y >= 0.0 && x < (self.side - 1) as f32 && y < (self.side - 1) as f32 {
+            true => self.inside([near, far], [x, y]),
+            false => [near, far].map(|plane| self.beside(plane, [x, y])),
+        };
+        a + (b - a) * (plane - near as f32)
+    }
+
+    /// T in two planes between four pixels.
+    fn inside(&self, planes: [usize; 2], [x, y]: [f32; 2]) -> [f32; 2] {
+        let (left, top) = (x as usize, y as usize);
+        let (right, down) = (x - left as f32, y - top as f32);
+        planes.map(|plane| {
+            let at = (plane * self.side + top) * self.side + left;
+            let row = |at: usize| self.light[at] + (self.light[at + 1] - self.light[at]) * right;
+            let (upper, lower) = (row(at), row(at + self.side));
+            upper + (lower - upper) * down
+        })
+    }
+
+    /// T in a plane at its border, or beyond.
+    fn beside(&self, plane: usize, [x, y]: [f32; 2]) -> f32 {
+        let side = self.side as i64;
+        let at = |x: i64, y: i64| {
+            let is_inside = (0..side).contains(&x) && (0..side).contains(&y);
+            if is_inside { self.light[plane * self.side * self.side + (y * side + x) as usize] } else { 1.0 }
+        };
+        // Far beyond the image there is as much light as beside it.
+        let [x, y] = [x, y].map(|at| at.clamp(-2.0, side as f32 + 1.0));
+        let (left, top) = (libm::floorf(x), libm::floorf(y));
+        let (right, down) = (x - left, y - top);
+        let row = |y: i64| {
+            let (a, b) = (at(left as i64, y), at(left as i64 + 1, y));
+            a + (b - a) * right
+        };
+        let (upper, lower) = (row(top as i64), row(top as i64 + 1));
+        upper + (lower - upper) * down
+    }
+}
