@@ -20,7 +20,6 @@ use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::transfer_function::TransferFunction;
-#[cfg(any(feature = "cpu", feature = "gpu"))]
 use crate::stats::Stats;
 use crate::volume::Volume;
 
@@ -146,8 +145,7 @@ impl KeptLight {
     }
 
     /// A frame's statistics with those of its light sheets, if it has any.
-    #[cfg(any(feature = "cpu", feature = "gpu"))]
-    pub(crate) fn noted_in(&self, stats: Stats) -> Stats {
+    pub fn noted_in(&self, stats: Stats) -> Stats {
         let sheets = self.sheets.iter().flatten().map(|(_, sheets)| sheets);
         let bytes: u64 = sheets.map(|sheets| size_of_val(&sheets.light[..]) as u64).sum();
         if self.matter.is_none() {

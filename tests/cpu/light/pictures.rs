@@ -9,12 +9,12 @@ use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::{Channel, VolumeSource};
 use sheetsplat::settings::{Classification, Compositing, Light, Method, Projection, Ramp, Region, Shading, Window};
-use sheetsplat::volume::Volume;
+use sheetsplat::volume::{Volume, builtin};
 
-use crate::common::compare::assert_at_least;
+use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{bits, largest_difference, rms};
 use crate::common::store::{MemoryStore, streamed};
-use crate::common::{COMPOSITINGS, SPACINGS, transfer};
+use crate::common::{COMPOSITINGS, SPACINGS, scene, transfer};
 use crate::light::on_threads;
 use crate::native::{draw, head, psnr, shown};
 
@@ -197,4 +197,31 @@ fn streams_refuse_light_by_name() {
         let error = StreamRenderer::new(streamed, &scene).unwrap_err().to_string();
         assert!(error.starts_with(key) && error.contains("streamed"), "{error}");
     }
+}
+
+/// Shadows move evenly while the light turns around a cube: no step of 0.4° changes the picture by much more than others do.
+#[test]
+fn turning_light_does_not_pop() {
+    let volume = builtin::volume("cube").unwrap();
+    let mut scene = scene(80, 80);
+    scene.camera.direction = DVec3::new(0.5, 0.8, -0.4);
+    scene.splatting.compositing = Compositing::Exponential;
+    scene.transfer = transfer(&[(0.0, [0.9, 0.8, 0.7])], &[(0.0, 0.0), (255.0, 0.6)]);
+    scene.shading = Shading { ambient: 0.3, diffuse: 0.7, shadow: 1.0, ..scene.shading };
+    let mut renderer = CpuRenderer::new(volume, &scene).unwrap();
+    let mut before: Option<Image> = None;
+    let mut steps = Vec::new();
+    for step in 0..=112 {
+        let (sine, cosine) = (f64::from(step) * 0.4).to_radians().sin_cos();
+        scene.shading.light = Light::Direction(DVec3::new(-cosine, -sine, 0.8));
+        renderer.set_scene(&scene).unwrap();
+        let image = renderer.draw().unwrap().image;
+        steps.extend(before.map(|before| rms(&before, &image)));
+        before = Some(image);
+    }
+    steps.sort_by(f64::total_cmp);
+    let (median, largest) = (steps[steps.len() / 2], steps[steps.len() - 1]);
+    println!("steps: median {median:.2e}, largest {largest:.2e}");
+    assert!(median > 1e-5);
+    assert_at_most(largest / median, 1.5, "the largest step");
 }
