@@ -135,7 +135,8 @@ impl Compositor {
     /// nothing counted; for a surface that is not reached the mean of the last sheet.
     #[inline(always)]
     fn pixels<S: Simd>(&self, simd: S, acc: Pixels<S>, sheet: Pixels<S>) -> Pixels<S> {
-        let (zero, one) = (f32x8::splat(simd, 0.0), f32x8::splat(simd, 1.0));
+        let splat = |number: f32| f32x8::splat(simd, number);
+        let (zero, one) = (splat(0.0), splat(1.0));
         let sheet = match self.compositing {
             Compositing::Linear => scaled(sheet, one / sheet[3].max(one)),
             Compositing::Exponential => scaled(sheet, saturation(simd, sheet[3])),
@@ -158,7 +159,11 @@ impl Compositor {
                 std::array::from_fn(|channel| is_reached.select(acc[channel], now(channel)))
             }
             // Opacity beyond 1 is a rounding error and must not hide another sheet.
-            (_, Order::FrontToBack) => sum(acc, scaled(sheet, (one - acc[3]).max(zero))),
+            (_, Order::FrontToBack) => {
+                // An opacity that rounding keeps a hair below 1 would let many faint sheets through.
+                let left = one - acc[3];
+                sum(acc, scaled(sheet, left.simd_gt(splat(f32::EPSILON)).select(left, zero)))
+            }
             (_, Order::BackToFront) => sum(sheet, scaled(acc, (one - sheet[3]).max(zero))),
         }
     }
