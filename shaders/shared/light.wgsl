@@ -1,4 +1,4 @@
-// What light sheets leave of light at a point (SPEC §14): A of ambient light and S of other light, from T, which the CPU has made (`src/light/`).
+// The light that light sheets leave at a point (SPEC §14): A of ambient light and S of other light. Both follow from T, which the CPU makes (`src/light/`).
 // `light_sheets` holds the planes of occlusion's stack, then those of shadow's.
 // The stage declares `light_sheets`.
 //
@@ -15,7 +15,7 @@ fn light_left(voxel: vec3f) -> vec2f {
     return vec2f(left_by(0u, voxel), left_by(1u, voxel));
 }
 
-// What a stack leaves of its light, given by its number.
+// The share of its light that a stack of sheets, given by its number, leaves at a point.
 fn left_by(stack: u32, voxel: vec3f) -> f32 {
     let of_stack = frame.light_stacks[stack];
     if of_stack.x == 0.0 {

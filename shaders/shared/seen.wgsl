@@ -80,7 +80,7 @@ struct Way {
     far: f32,
 }
 
-// A point of it in voxels, which only light sheets ask for.
+// A point of a stretch in voxel coordinates. Only light sheets need it.
 fn point_on(way: Way, share: f32) -> vec3f {
     if !LIGHT {
         return vec3f(0.0);
@@ -98,8 +98,8 @@ fn gradient_opacity(table: Table, gradient: Gradient) -> f32 {
     return opacity;
 }
 
-// The shaded means over the values between two samples, each a number and its gradient, from the nearer to the farther one, which lie at two points in
-// voxels. `own` is the colour of the voxels' own there.
+// The shaded means over the values between two samples, each a number and its gradient, from the nearer to the farther one, at the ends of a
+// stretch of the ray. `own` is the colour of the voxels' own there.
 fn look(near: vec4f, far: vec4f, way: Way, own: vec4f, table: Table, light: Lighting) -> Look {
     let means = slab_integral(table, near.x, far.x);
     if means.amount <= 0.0 {

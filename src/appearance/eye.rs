@@ -5,6 +5,7 @@ use std::fmt;
 use glam::{DMat3, DVec3};
 
 use super::Preset;
+use crate::settings::camera::least_axis;
 use crate::volume::Volume;
 
 /// Degrees to the side and upwards from the front of a patient, and from the shown side of anything else.
@@ -108,11 +109,6 @@ fn axis(number: usize) -> DVec3 {
 /// The upward direction of a view along an axis.
 fn upright(along: usize) -> DVec3 {
     if along == 2 { DVec3::Y } else { DVec3::Z }
-}
-
-/// The first axis with the least number.
-fn least_axis(numbers: DVec3) -> usize {
-    (0..3).fold(0, |least, axis| if numbers[axis] < numbers[least] { axis } else { least })
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ pub(super) struct Unshaded {
     to_eye: [[f32; LANES]; 3],
     /// The factor for amounts.
     scale: [f32; LANES],
-    /// What is left of ambient and of other light (SPEC §14).
+    /// The shares that are left of ambient and of other light (SPEC §14).
     left: [[f32; LANES]; 2],
 }
 

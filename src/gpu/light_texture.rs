@@ -1,9 +1,9 @@
 //! Light sheets (SPEC §14) on the GPU: the planes of both stacks in a texture of three dimensions, which shading looks up by `shaders/shared/light.wgsl`.
 
-use std::sync::Arc;
+use std::sync::{Arc, Weak};
 
 use wgpu::{
-    Device, Extent3d, Limits, Origin3d, Queue, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect,
+    Device, Extent3d, Limits, Origin3d, Queue, TexelCopyBufferLayout, TexelCopyTextureInfo, Texture, TextureAspect,
     TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
 };
 
@@ -22,8 +22,9 @@ const TEXEL: u64 = size_of::<f32>() as u64;
 pub struct LightTexture {
     /// `R32Float`: the planes of occlusion's stack, then those of shadow's.
     pub view: TextureView,
-    /// The stacks.
-    sheets: [Option<Arc<LightSheets>>; 2],
+    texture: Texture,
+    /// The stacks, which may be freed meanwhile.
+    sheets: [Option<Weak<LightSheets>>; 2],
     /// Bytes of GPU memory.
     pub gpu_bytes: u64,
 }
@@ -34,7 +35,7 @@ fn stacks(lights: &Lights) -> [Option<(f32, &Arc<LightSheets>)>; 2] {
 }
 
 impl LightTexture {
-    /// The light sheets of a frame; those of the previous one if they are the same.
+    /// The light sheets of a frame, in the texture of the previous one if that has the right size.
     ///
     /// # Errors
     /// If the device's textures are too small.
@@ -42,22 +43,25 @@ impl LightTexture {
         device: &Device,
         queue: &Queue,
         lights: &Lights,
-        previous: Option<Self>,
+        mut previous: Option<Self>,
     ) -> Result<Self, RenderError> {
         let sheets = stacks(lights).map(|stack| stack.map(|(_, sheets)| sheets));
         let is_same = |previous: &Self| {
             previous.sheets.iter().zip(&sheets).all(|pair| match pair {
-                (Some(old), Some(new)) => Arc::ptr_eq(old, new),
+                (Some(old), Some(new)) => old.ptr_eq(&Arc::downgrade(new)),
                 (old, new) => old.is_none() && new.is_none(),
             })
         };
-        if let Some(previous) = previous.filter(is_same) {
+        if let Some(previous) = previous.take_if(|previous| is_same(previous)) {
             return Ok(previous);
         }
         let side = sheets.iter().flatten().map(|sheets| sheets.side as u32).max().unwrap_or(1);
         let planes = sheets.iter().flatten().map(|sheets| sheets.planes() as u32).sum::<u32>();
         let gpu_bytes = Self::estimate(&device.limits(), [side, planes])?;
-        let texture = texture(device, "sheetsplat.light_sheets", [side, side, planes.max(1)]);
+        let size = [side, side, planes.max(1)];
+        let has_size = |texture: &Texture| texture.size() == extent(size);
+        let kept = previous.map(|previous| previous.texture).filter(has_size);
+        let texture = kept.unwrap_or_else(|| texture(device, "sheetsplat.light_sheets", size));
         let mut first = 0;
         for sheets in sheets.iter().flatten().filter(|sheets| sheets.planes() > 0) {
             let of_stack = sheets.planes() as u32;
@@ -79,18 +83,15 @@ impl LightTexture {
                         bytes_per_row: Some(side * TEXEL as u32),
                         rows_per_image: Some(side),
                     },
-                    Extent3d {
-                        width: side,
-                        height: side,
-                        depth_or_array_layers: (planes.len() / (side as usize * side as usize)) as u32,
-                    },
+                    extent([side, side, (planes.len() / (side as usize * side as usize)) as u32]),
                 );
             }
             first += of_stack;
         }
         Ok(Self {
             view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
-            sheets: sheets.map(|sheets| sheets.cloned()),
+            sheets: sheets.map(|sheets| sheets.map(Arc::downgrade)),
+            texture,
             gpu_bytes,
         })
     }
@@ -128,10 +129,14 @@ pub fn note(frame: &mut Frame, lights: &Lights) {
     }
 }
 
-fn texture(device: &Device, label: &str, [width, height, depth]: [u32; 3]) -> wgpu::Texture {
+fn extent([width, height, depth]: [u32; 3]) -> Extent3d {
+    Extent3d { width, height, depth_or_array_layers: depth }
+}
+
+fn texture(device: &Device, label: &str, size: [u32; 3]) -> Texture {
     device.create_texture(&TextureDescriptor {
         label: Some(label),
-        size: Extent3d { width, height, depth_or_array_layers: depth },
+        size: extent(size),
         mip_level_count: 1,
         sample_count: 1,
         dimension: TextureDimension::D3,

@@ -31,7 +31,7 @@ impl Area {
         }
     }
 
-    /// The area with some pixels more at each side, in an image of some width and height.
+    /// The area with some pixels more at each side, in an image of `side` pixels along each side.
     pub(super) fn grown(self, by: usize, side: usize) -> Self {
         if self.is_empty() {
             return self;

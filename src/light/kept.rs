@@ -1,4 +1,4 @@
-//! What a view keeps of its light from frame to frame: the matter while the transfer function and the cuts stay, and each stack of sheets while its light does.
+//! A view keeps its light from frame to frame: the matter while the transfer function and the cuts stay, and each stack of sheets while its light stays.
 
 use std::sync::Arc;
 
@@ -27,7 +27,7 @@ use crate::volume::Volume;
 #[derive(Clone, Debug, Default)]
 pub struct KeptLight {
     matter: Option<KeptMatter>,
-    /// Those of occlusion and of shadow.
+    /// The stacks of occlusion and of shadow.
     sheets: [Option<(Source, Arc<LightSheets>)>; 2],
     /// Milliseconds that the last call took.
     milliseconds: f64,
@@ -41,7 +41,7 @@ struct KeptMatter {
     matter: LightMatter,
 }
 
-/// What a stack of sheets depends on besides the matter.
+/// A stack of sheets depends on this besides the matter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Source {
     /// The unit vector to the light.
@@ -83,7 +83,7 @@ impl KeptLight {
         let matter = &self.matter.insert(matter).matter;
         let Shading { occlusion, shadow, .. } = scene.shading;
         let wanted = sources(scene, camera);
-        // What nobody else holds any more is memory for new sheets.
+        // Sheets that nobody else holds any more give their memory to new ones.
         let mut memory = [Vec::new(), Vec::new()];
         for ((kept, wanted), memory) in self.sheets.iter_mut().zip(wanted).zip(&mut memory) {
             let old = kept.take_if(|(source, _)| Some(*source) != wanted);
@@ -155,7 +155,7 @@ impl KeptLight {
     }
 }
 
-/// What the stacks of occlusion and of shadow depend on, as far as a scene with a framed camera has them.
+/// The sources of the stacks of occlusion and of shadow that a scene with a framed camera has.
 fn sources(scene: &Scene, camera: &Camera) -> [Option<Source>; 2] {
     let Shading { occlusion, occlusion_spread, shadow, shadow_spread, light_step: step, light, .. } = scene.shading;
     let basis = camera.basis();

@@ -1,4 +1,4 @@
-//! What light sheets leave of a scene's light: A and S of SPEC §14.
+//! The light that light sheets leave in a scene: A and S of SPEC §14.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use glam::DVec3;
 
 use super::sheets::LightSheets;
 
-/// What is left of ambient and of other light: A and S.
+/// The shares that are left of ambient and of other light: A and S.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Left {
     /// A.
@@ -25,7 +25,7 @@ pub struct Lights {
 }
 
 impl Lights {
-    /// What is left of light at a point in voxel coordinates.
+    /// The light that is left at a point in voxel coordinates.
     pub fn left(&self, voxel: DVec3) -> Left {
         let left = |light: &Option<(f32, Arc<LightSheets>)>| {
             light.as_ref().map_or(1.0, |(amount, sheets)| 1.0 - amount * (1.0 - sheets.at(voxel)))

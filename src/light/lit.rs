@@ -18,7 +18,7 @@ pub(super) struct Lit {
 const WORD: usize = u64::BITS as usize;
 
 impl Lit {
-    /// Those of the planes of several stacks, where any of them has light.
+    /// The pixels in which a plane of any of several stacks has light.
     pub(super) fn of(planes: &[&[f32]], side: usize) -> Self {
         let across = side.div_ceil(WORD);
         let mut words = vec![0; across * side];

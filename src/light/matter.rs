@@ -29,7 +29,7 @@ pub struct LightMatter {
 }
 
 impl LightMatter {
-    /// That of a volume under a transfer function and cuts.
+    /// The matter of a volume under a transfer function and cuts.
     pub fn new(volume: &Volume, transfer: &TransferFunction, clip: &Clip) -> Self {
         let bricks = lit_bricks(volume, transfer, clip).bricks().to_vec();
         let is_by_value = volume.further().is_empty()

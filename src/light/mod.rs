@@ -19,7 +19,6 @@ mod lights;
 mod lit;
 mod matter;
 mod profile;
-mod section;
 mod sheets;
 mod splat;
 mod view;

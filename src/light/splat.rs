@@ -8,7 +8,6 @@ use super::box_filter::Area;
 use super::lit::Lit;
 use super::matter::LightMatter;
 use super::profile::{Profile, least, most, nearest, passed};
-use super::section::Section;
 use super::view::LightView;
 use super::window::{Places, Window};
 use crate::geometry::slab::SlabGrid;
@@ -27,6 +26,16 @@ struct Placed {
     first: [f32; 3],
     /// The pixels that its footprints may reach.
     area: Area,
+}
+
+/// A voxel's section in a slab.
+struct Section {
+    /// The pixel coordinates, from the band's first pixel.
+    center: [f32; 2],
+    /// The slab's planes, grid units along the ray from the voxel.
+    planes: [f32; 2],
+    /// The amount per `unit`, scaled.
+    amount: f32,
 }
 
 /// How footprints are drawn.

@@ -6,7 +6,7 @@ use crate::error::RenderError;
 use crate::error::setting::{SettingError, scaled};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::scene::Scene;
-use crate::settings::camera::{Camera, Projection};
+use crate::settings::camera::{Camera, Projection, least_axis};
 use crate::settings::splatting::Splatting;
 use crate::volume::Grid;
 
@@ -66,12 +66,5 @@ fn raised(up: DVec3, to_light: DVec3) -> DVec3 {
     if up.cross(to_light).length() >= PARALLEL {
         return up;
     }
-    let size = to_light.abs();
-    if size.x <= size.y && size.x <= size.z {
-        DVec3::X
-    } else if size.y <= size.z {
-        DVec3::Y
-    } else {
-        DVec3::Z
-    }
+    DVec3::AXES[least_axis(to_light.abs())]
 }

@@ -11,7 +11,7 @@ use crate::error::setting::{SettingError, scaled};
 use crate::geometry::slab::SlabGrid;
 use crate::kernel::Kernel;
 use crate::scene::Scene;
-use crate::settings::camera::{Camera, Eye, ViewBasis};
+use crate::settings::camera::{Camera, Eye, ViewBasis, least_axis};
 use crate::settings::clip::HalfSpace;
 use crate::settings::economies::Economies;
 use crate::settings::splatting::Method;
@@ -109,7 +109,7 @@ impl Geometry {
     pub fn of_light(grid: &Grid, scene: &Scene, to_light: DVec3) -> Result<Self, RenderError> {
         let (splatting, step) = (&scene.splatting, scene.shading.light_step);
         let up = scaled(scene.camera.up).normalize();
-        let up = if up.cross(to_light).length() < 0.1 { least_axis(to_light) } else { up };
+        let up = if up.cross(to_light).length() < 0.1 { DVec3::AXES[least_axis(to_light.abs())] } else { up };
         let camera = Camera { direction: -to_light, up, center: None, ..Camera::default() };
         let (basis, aspect) = (camera.basis(), grid.aspect());
         let ray = Ray::new(basis.w, &basis, aspect);
@@ -319,17 +319,5 @@ impl Geometry {
         };
         let footprint = ray.footprint(eye.pix(splat.depth + middle * ray.depth_per_warped));
         section(footprint, t0, t1, footprint.amplitude)
-    }
-}
-
-/// The world axis least along a vector; ties: x, y, z.
-fn least_axis(along: DVec3) -> DVec3 {
-    let size = along.abs();
-    if size.x <= size.y && size.x <= size.z {
-        DVec3::X
-    } else if size.y <= size.z {
-        DVec3::Y
-    } else {
-        DVec3::Z
     }
 }

@@ -69,7 +69,7 @@ impl Lights {
         })
     }
 
-    /// Those that are given, or a scene's.
+    /// The given light sheets, or a scene's.
     pub(super) fn or_new(
         given: Option<&Arc<Self>>,
         volume: &Volume,
@@ -79,7 +79,7 @@ impl Lights {
         given.map_or_else(|| Self::new(volume, transfer, scene).map(Arc::new), |given| Ok(Arc::clone(given)))
     }
 
-    /// What is left of light at a point, in `unit`s from the grid's centre.
+    /// The light that is left at a point, in `unit`s from the grid's centre.
     pub fn left(&self, p: DVec3) -> Left {
         let left = |light: &Option<(f64, LightSheets)>| {
             light.as_ref().map_or(1.0, |(amount, sheets)| 1.0 - amount * (1.0 - sheets.at(p)))

@@ -227,8 +227,20 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
 
 fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
     let default = Shading::default();
-    let Shading { enabled, ambient, diffuse, specular, shininess, light, gradient, .. } = *shading;
-    let Shading { occlusion, occlusion_spread, shadow, shadow_spread, light_step, .. } = *shading;
+    let Shading {
+        enabled,
+        ambient,
+        diffuse,
+        specular,
+        shininess,
+        light,
+        gradient,
+        occlusion,
+        occlusion_spread,
+        shadow,
+        shadow_spread,
+        light_step,
+    } = *shading;
     text.table("shading");
     if !(fitting.enabled && enabled == default.enabled) {
         text.line("enabled", enabled);

@@ -116,8 +116,20 @@ impl Shading {
     /// # Errors
     /// If a number is not finite or out of its range, or the light's direction is 0.
     pub fn check(&self) -> Result<(), SettingError> {
-        let Self { enabled: _, ambient, diffuse, specular, shininess, light, gradient: _, .. } = *self;
-        let Self { occlusion, occlusion_spread, shadow, shadow_spread, light_step, .. } = *self;
+        let Self {
+            enabled: _,
+            ambient,
+            diffuse,
+            specular,
+            shininess,
+            light,
+            gradient: _,
+            occlusion,
+            occlusion_spread,
+            shadow,
+            shadow_spread,
+            light_step,
+        } = *self;
         Interval::NOT_NEGATIVE.check("shading.ambient", ambient)?;
         Interval::NOT_NEGATIVE.check("shading.diffuse", diffuse)?;
         Interval::NOT_NEGATIVE.check("shading.specular", specular)?;

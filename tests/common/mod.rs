@@ -20,7 +20,7 @@ use glam::{DVec3, DVec4, UVec3};
 use sheetsplat::scene::{ImageSettings, Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::Ramp;
 use sheetsplat::settings::{Camera, Projection};
-use sheetsplat::settings::{Compositing, Rasterizer, Splatting};
+use sheetsplat::settings::{Compositing, Light, Rasterizer, Shading, Splatting};
 use sheetsplat::volume::{Grid, Volume};
 
 /// The maximum relative error of rounding to the nearest f32.
@@ -59,6 +59,19 @@ pub(crate) fn scene(width: u32, height: u32) -> Scene {
     let image = ImageSettings { width, height, ..ImageSettings::default() };
     let (camera, splatting) = (Camera::default(), Splatting::default());
     Scene { image, camera, splatting, ..Scene::new(VolumeSource::Builtin("cube".to_owned())) }
+}
+
+/// A material in the light of both kinds of sheets.
+pub(crate) fn lit_by_sheets(shading: Shading) -> Shading {
+    Shading {
+        ambient: 0.6,
+        diffuse: 0.4,
+        light: Light::UpperLeft,
+        occlusion: 0.8,
+        shadow: 0.7,
+        light_step: 1.5,
+        ..shading
+    }
 }
 
 /// An orthographic camera that shows `height` world units.

@@ -5,14 +5,14 @@ use glam::DVec3;
 use sheetsplat::Scene;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::{Channel, VolumeSource};
-use sheetsplat::settings::{Classification, Compositing, Light, Method, Projection, Ramp, Rasterizer, Shading};
+use sheetsplat::settings::{Classification, Compositing, Light, Method, Projection, Ramp, Rasterizer};
 use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::cases::in_turns;
 use crate::common::compare::{assert_at_least, assert_at_most, decibels};
 use crate::common::devices::{Drawing, gpu};
 use crate::common::images::{largest_difference, rms};
-use crate::common::{RASTERIZERS, scene, transfer};
+use crate::common::{RASTERIZERS, lit_by_sheets, scene, transfer};
 
 const CLASSIFICATIONS: [Classification; 2] = [Classification::Before, Classification::After];
 
@@ -26,15 +26,7 @@ fn lit(classification: Classification) -> (Volume, Scene) {
         &[(40.0, [0.9, 0.6, 0.4]), (120.0, [0.8, 0.3, 0.2]), (220.0, [1.0, 1.0, 0.9])],
         &[(30.0, 0.0), (80.0, 0.15), (130.0, 0.1), (200.0, 0.9)],
     );
-    scene.shading = Shading {
-        ambient: 0.6,
-        diffuse: 0.4,
-        light: Light::UpperLeft,
-        occlusion: 0.8,
-        shadow: 0.7,
-        light_step: 1.5,
-        ..scene.shading
-    };
+    scene.shading = lit_by_sheets(scene.shading);
     (builtin::volume("head:24").unwrap(), scene)
 }
 

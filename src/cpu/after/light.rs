@@ -1,4 +1,4 @@
-//! What light sheets leave of light at points of pixels' rays (SPEC §14).
+//! The light that light sheets leave at points of pixels' rays (SPEC §14).
 
 use fearless_simd::f32x8;
 use fearless_simd::prelude::*;

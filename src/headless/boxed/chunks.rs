@@ -242,7 +242,7 @@ impl<'a> Chunks<'a> {
         self.channels.iter()
     }
 
-    /// What a view of the volume is, and its grid.
+    /// The view, and the volume's grid.
     #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
     pub(super) fn geometry(&self) -> (&ViewGeometry, &Grid) {
         (&self.view, self.volume.grid())

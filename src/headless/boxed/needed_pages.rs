@@ -35,7 +35,7 @@ impl Needed {
         true
     }
 
-    /// All pages, in an order that no hash decides: it decides which of them get slots.
+    /// Sorts pages, because their order decides which of them get slots, and a set has an order of its own in every run.
     pub(super) fn sorted(pages: HashSet<ChannelPage>) -> Vec<ChannelPage> {
         let mut pages: Vec<ChannelPage> = pages.into_iter().collect();
         pages.sort_unstable_by_key(|&(channel, at)| (channel, at.to_array()));

@@ -26,7 +26,7 @@ pub struct Frame<'a> {
     pub(super) slabs: Range<i32>,
     pub(super) geometry: Geometry,
     pub(super) field: Field<'a>,
-    /// Those of all channels.
+    /// The light sheets of all channels.
     pub(super) lights: Arc<Lights>,
 }
 

@@ -132,7 +132,7 @@ impl<'a> Pixel<'a> {
         self.ray.origin + self.ray.depth(&self.frame.geometry, sheet) * self.ray.along
     }
 
-    /// What is left of light at a position on the ray.
+    /// The light that is left at a position on the ray.
     pub(super) fn left(&self, sheet: f64) -> Left {
         self.frame.lights.left(self.position(sheet))
     }

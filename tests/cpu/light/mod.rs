@@ -3,7 +3,6 @@
 
 mod pictures;
 mod sheets;
-mod speed;
 mod twin;
 
 use std::sync::Arc;
@@ -24,7 +23,7 @@ fn in_units(volume: &Volume, voxel: DVec3) -> DVec3 {
     (voxel - volume.grid().center()) * volume.grid().aspect()
 }
 
-/// What some number of threads give.
+/// The result of a computation on some number of threads.
 fn on_threads<T: Send>(threads: usize, give: impl FnOnce() -> T + Send) -> T {
     rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(give)
 }

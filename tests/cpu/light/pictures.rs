@@ -14,7 +14,7 @@ use sheetsplat::volume::{Volume, builtin};
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{bits, largest_difference, rms};
 use crate::common::store::{MemoryStore, streamed};
-use crate::common::{COMPOSITINGS, SPACINGS, scene, transfer};
+use crate::common::{COMPOSITINGS, SPACINGS, lit_by_sheets, scene, transfer};
 use crate::light::on_threads;
 use crate::native::{draw, head, psnr, shown};
 
@@ -24,15 +24,7 @@ const CLASSIFICATIONS: [(Classification, f64); 2] = [(Classification::Before, 10
 fn lit(classification: Classification) -> (Volume, Scene) {
     let (volume, mut scene) = head();
     scene.splatting.classification = classification;
-    scene.shading = Shading {
-        ambient: 0.6,
-        diffuse: 0.4,
-        light: Light::UpperLeft,
-        occlusion: 0.8,
-        shadow: 0.7,
-        light_step: 1.5,
-        ..scene.shading
-    };
+    scene.shading = lit_by_sheets(scene.shading);
     (volume, scene)
 }
 
@@ -185,7 +177,7 @@ fn light_does_not_depend_on_slab_widths() {
     }
 }
 
-/// What would be drawn without the light of the whole volume is refused by its key.
+/// Ways of drawing that do not know the whole volume's light refuse it by its key.
 #[test]
 fn streams_refuse_light_by_name() {
     for (occlusion, key) in [(0.8, "shading.occlusion"), (0.0, "shading.shadow")] {

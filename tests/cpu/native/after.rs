@@ -12,10 +12,10 @@ use sheetsplat::settings::{
 };
 use sheetsplat::volume::{Labels, Volume};
 
-use crate::common::images::{bits, largest_difference};
+use crate::common::images::bits;
 use crate::common::shared::shared;
 use crate::common::{BY_AMOUNTS, BY_MEANS, Random, SPACINGS, camera};
-use crate::native::{ROUNDING, draw, head, psnr, random_case, shown, twin};
+use crate::native::{culled_cases, draw, head, psnr, random_case, shown, twin};
 
 /// PSNR that SPEC §12 asks for, dB, by gradient.
 fn required(scene: &Scene) -> f64 {
@@ -341,24 +341,11 @@ fn culling_keeps_its_guarantee() {
     // The halves of cubic slabs are opaque a little later.
     for (slab_profile, least) in [(SlabProfile::Linear, 10), (SlabProfile::Cubic, 8)] {
         let mut random = Random(2001);
-        let mut culled = 0;
-        for case in 0..40 {
+        let culled = culled_cases(40, || {
             let (volume, mut scene) = random_after(&mut random);
             scene.splatting.slab_profile = slab_profile;
-            let [with, without] = [true, false].map(|culling| {
-                scene.splatting.culling = culling;
-                draw(&volume, &scene)
-            });
-            let allowed = 1.0 - scene.splatting.opacity_threshold + ROUNDING;
-            let difference = largest_difference(&with.image, &without.image);
-            assert!(difference <= allowed, "case {case}: {difference} > {allowed} with {scene:?}");
-            let [few, all] = [&with, &without].map(|rendering| rendering.stats.counts.sections_rasterized);
-            assert!(few <= all && all <= with.stats.counts.sections_total, "case {case}: {few}, {all} with {scene:?}");
-            culled += usize::from(few < all);
-            scene.splatting.opacity_threshold = 1.0;
-            scene.splatting.culling = true;
-            assert_eq!(bits(&draw(&volume, &scene).image), bits(&without.image), "case {case}, T = 1, with {scene:?}");
-        }
+            (volume, scene)
+        });
         assert!(culled > least, "{slab_profile:?}: only {culled} cases cull anything");
     }
 }
