@@ -11,7 +11,7 @@ use crate::error::setting::{SettingError, scaled};
 use crate::geometry::slab::SlabGrid;
 use crate::kernel::Kernel;
 use crate::scene::Scene;
-use crate::settings::camera::{Camera, Eye, ViewBasis, least_axis};
+use crate::settings::camera::{Camera, Eye, ViewBasis};
 use crate::settings::clip::HalfSpace;
 use crate::settings::economies::Economies;
 use crate::settings::splatting::Method;
@@ -109,7 +109,10 @@ impl Geometry {
     pub fn of_light(grid: &Grid, scene: &Scene, to_light: DVec3) -> Result<Self, RenderError> {
         let (splatting, step) = (&scene.splatting, scene.shading.light_step);
         let up = scaled(scene.camera.up).normalize();
-        let up = if up.cross(to_light).length() < 0.1 { DVec3::AXES[least_axis(to_light.abs())] } else { up };
+        // The first of the axes that are least along the light.
+        let along = |axis: &DVec3| axis.dot(to_light).abs();
+        let least = DVec3::AXES.into_iter().min_by(|a, b| along(a).total_cmp(&along(b)));
+        let up = least.filter(|_| up.cross(to_light).length() < 0.1).unwrap_or(up);
         let camera = Camera { direction: -to_light, up, center: None, ..Camera::default() };
         let (basis, aspect) = (camera.basis(), grid.aspect());
         let ray = Ray::new(basis.w, &basis, aspect);

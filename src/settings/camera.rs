@@ -276,6 +276,7 @@ impl ViewBasis {
         DMat3::from_cols(self.u, self.v, self.w).transpose()
     }
 }
+
 /// The first axis with the least number.
 pub(crate) fn least_axis(numbers: DVec3) -> usize {
     (0..3).fold(0, |least, axis| if numbers[axis] < numbers[least] { axis } else { least })

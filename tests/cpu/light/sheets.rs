@@ -56,8 +56,16 @@ fn apart(sheets: &LightSheets, expected: &light::LightSheets) -> f64 {
 fn stacks_are_those_of_the_f64_evaluation() {
     let mut random = Random(52);
     let (mut worst, mut dark): (f64, u32) = (0.0, 0);
+    // Along the light there is no `up`, so another axis takes its place, of equal ones the first.
+    let along =
+        [[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 1.0, 0.05], [1.0, 1.0, 1.0], [-2.0, 1.0, 1.0], [1.0, 2.0, -2.0]];
     for number in 0..40 {
-        let (volume, scene) = case(&mut random);
+        let (volume, mut scene) = case(&mut random);
+        if let Some(&along) = along.get(number) {
+            let up = DVec3::from(along);
+            (scene.camera.direction, scene.camera.up) = (up.any_orthogonal_vector(), up);
+            scene.shading.light = Light::Direction(-up);
+        }
         let transfer = scene.transfer.resolve(&volume);
         let basis = scene.camera.basis();
         let found = lights(&volume, &scene);
