@@ -171,6 +171,7 @@ fn every_key() {
         clip: Clip {
             planes: vec![[0.0, 0.0, 2.0, -1.0], [1.0, 0.5, 0.0, 3.0]],
             crop: Some([DVec3::new(-1.0, -2.0, -3.0), DVec3::new(4.0, 5.0, 6.5)]),
+            shade_faces: false,
         },
         transfer: TransferSettings {
             color: Some(Ramp::new(vec![(-1.0, DVec3::ZERO), (80.5, DVec3::new(0.9, 0.7, 1.0))]).unwrap()),
