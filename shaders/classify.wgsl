@@ -116,13 +116,17 @@ fn main(@builtin(local_invocation_id) local: vec3u, @builtin(workgroup_id) workg
             let at = place_of(px);
             let image = acc[slot];
             var depths = in_box(at, cut.box_half.xyz);
+            var face = FAR;
             if CUT {
-                depths = both(depths, shown_depths(px));
+                let cuts = shown_depths(px);
+                let in_volume = depths;
+                depths = both(depths, cuts);
+                face = face_depth(at, depths, cuts, in_volume.x);
             }
             let ray = sheet_depths(at, depths);
             let slope = slope_of(px);
             let per_depth = sqrt(1.0 + dot(slope, slope)) / abs(dot(cut.sheet_along.xyz, at));
-            let place = place_between(px, at, near, sheet_group.near, ray, per_depth);
+            let place = place_between(px, at, near, sheet_group.near, vec3f(ray, face), per_depth);
             var composited = Composited(image, vec4u(), vec4f(), FAR, false);
             var near_sheets = ChannelSum();
             var far_sheets = ChannelSum();

@@ -40,7 +40,7 @@ fn main(@builtin(local_invocation_index) thread: u32, @builtin(workgroup_id) wor
     let id = fresh[at];
     let voxel = voxel_of(bricks[id / BRICK_VOXELS], id % BRICK_VOXELS);
     let p = project(voxel);
-    let light = lighting(p.xy, frame.near > 0.0);
+    let light = voxel_lighting(voxel, p.xy, frame.near > 0.0);
     // A voxel's footprint is the same in all channels, so their amounts are drawn as one (SPEC §10).
     var channels = ChannelSum();
     for (var channel = 0u; channel < CHANNELS; channel += 1u) {

@@ -78,7 +78,7 @@ fn shaded_further(voxel: vec3u, channel: u32, p: vec4f) -> Shaded {
 
 fn of_opacity(color: vec3f, alpha: f32, gradient: Gradient, voxel: vec3u, p: vec4f) -> Shaded {
     let m = amount(alpha);
-    return Shaded(vec4f(shade(color, gradient, lighting(p.xy, PERSPECTIVE), vec3f(voxel)) * m, m), alpha);
+    return Shaded(vec4f(shade(color, gradient, voxel_lighting(voxel, p.xy, PERSPECTIVE), vec3f(voxel)) * m, m), alpha);
 }
 
 // In the first channel.

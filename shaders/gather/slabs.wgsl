@@ -28,14 +28,21 @@
 // The length of a ray per sheet depth at a thread's four pixels.
 var<private> length_per_depth: vec4f;
 
+// The sheet depths at which these rays enter through cuts whose faces are not shaded.
+var<private> face_at: vec4f;
+
 // Finds the stretches of the rays of a thread's four pixels, which lie in one column.
 fn find_stretches(column: f32, rows: vec4f) {
     for (var i = 0u; i < 4u; i += 1u) {
         let point_px = vec2f(column, rows[i]);
         let at = place_of(point_px);
         var depths = in_box(at, cut.box_half.xyz);
+        face_at[i] = FAR;
         if CUT {
-            depths = both(depths, shown_depths(point_px));
+            let cuts = shown_depths(point_px);
+            let in_volume = depths;
+            depths = both(depths, cuts);
+            face_at[i] = face_depth(at, depths, cuts, in_volume.x);
         }
         let sheets = sheet_depths(at, depths);
         let slope = slope_of(point_px);
@@ -309,7 +316,7 @@ fn color_before_slab(points: Points, at: u32) -> vec4f {
 // The ray of a thread's `i`-th pixel in a slab.
 fn place_in_slab(pixels: Pixels, i: u32, near: f32, far: f32) -> Slab {
     let px = vec2f(pixels.column, pixels.rows[i]);
-    return place_between(px, place_of(px), near, far, vec2f(shown_from[i], shown_to[i]), length_per_depth[i]);
+    return place_between(px, place_of(px), near, far, vec3f(shown_from[i], shown_to[i], face_at[i]), length_per_depth[i]);
 }
 
 // Whether a slab may change a pixel of some colour.

@@ -68,6 +68,13 @@ fn shown_share(ray: vec2f, near: f32, width: f32) -> f32 {
     return max(1.0 - missing / width, 0.0);
 }
 
+// The sheet depth at which a ray enters through a cut whose face is not shaded, given its visible range of depths and those of its cuts; FAR if it does not.
+fn face_depth(at: vec3f, depths: vec2f, cuts: vec2f, box_start: f32) -> f32 {
+    let is_face = (cut.slabs.z != 0.0) & (cuts.x > box_start);
+    let sheet = dot(cut.sheet_at.xyz, at) + dot(cut.sheet_along.xyz, at) * cuts.x;
+    return select(FAR, sheet, is_face & (depths.x < depths.y));
+}
+
 // A range of depths on a ray, converted to sheet depths; an empty range stays reversed.
 fn sheet_depths(at: vec3f, depths: vec2f) -> vec2f {
     let slope = dot(cut.sheet_along.xyz, at);

@@ -14,6 +14,7 @@ struct Frame {
     gradient: vec4f,
     light_place: array<vec4f, 6>,
     light_stacks: array<vec4f, 2>,
+    faces: array<vec4f, 12>,
     dims: vec4u,
     ramps: vec4u,
     size: vec2u,

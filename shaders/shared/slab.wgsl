@@ -31,6 +31,9 @@ const NO_SAMPLE = vec4f(NO_NUMBER, 0.0, 0.0, 0.0);
 // Numbers that differ by less, relative to the range of all numbers, count as equal: in homogeneous matter only rounding tells them apart.
 const HAIR_OF_RANGE = 2e-6;
 
+// The slack in slabs for rays that enter through a cut where two slabs meet.
+const HAIR_OF_SLAB = 1e-4;
+
 // By how much of a cell the middles of rays are moved before their voxel is found: where cells meet, rounding would decide pixel by pixel.
 const HAIR_OF_CELL = 1e-3;
 
@@ -88,6 +91,8 @@ struct Slab {
     far: f32,
     plane: f32,
     ray: vec2f,
+    // The sheet depth at which the ray enters through a cut whose face is not shaded.
+    face: f32,
     // The ray's length per sheet depth, and its way from plane to plane in `unit`s.
     per_depth: f32,
     way: vec3f,
@@ -144,11 +149,17 @@ fn part_of(ray: vec2f, near: f32, far: f32) -> vec2f {
     return vec2f(max(ray.x, near), min(ray.y, far));
 }
 
-// A ray in a slab whose planes' samples are not known yet.
-fn place_between(px: vec2f, at: vec3f, near: f32, drawn: f32, ray: vec2f, per_depth: f32) -> Slab {
+// The lighting of a point at a sheet depth of a ray, within a slab.
+fn lighting_in(light: Lighting, slab: Slab, near: f32) -> Lighting {
+    let from_near = slab.face + HAIR_OF_SLAB * frame.slab_width - near;
+    return Lighting(light.light, light.half_vector, from_near >= 0.0 && from_near < frame.slab_width);
+}
+
+// A ray in a slab whose planes' samples are not known yet. `ray` is its stretch, and the depth of its face.
+fn place_between(px: vec2f, at: vec3f, near: f32, drawn: f32, ray: vec3f, per_depth: f32) -> Slab {
     let none = vec4f(0.0);
     let way = normalize(warped_ray(px) * frame.aspect.xyz) * (per_depth * frame.slab_width);
-    return Slab(at, near, near + frame.slab_width, drawn, ray, per_depth, way, none, none, none, none, none, none);
+    return Slab(at, near, near + frame.slab_width, drawn, ray.xy, ray.z, per_depth, way, none, none, none, none, none, none);
 }
 
 // A stretch of a slab along which samples run linearly.
@@ -189,7 +200,8 @@ struct SlabSheets {
 }
 
 // `linear`, `exponential`, `xray`: a channel's sheets.
-fn sheets_of(slab: Slab, light: Lighting) -> SlabSheets {
+fn sheets_of(slab: Slab, in_open: Lighting) -> SlabSheets {
+    let light = lighting_in(in_open, slab, slab.near);
     let part = part_of(slab.ray, slab.near, slab.far);
     let table = table_at(slab.at, 0.5 * (part.x + part.y), 0.0);
     var sheets = SlabSheets();
@@ -245,7 +257,8 @@ fn composite_sheet(sheet: vec4f, part: vec2f, image: vec4f) -> Composited {
 }
 
 // `surface`: the pixel is opaque where its ray first meets one.
-fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
+fn find_surface(slab: Slab, image: vec4f, in_open: Lighting) -> Composited {
+    let light = lighting_in(in_open, slab, slab.near);
     let result = Composited(image, vec4u(), vec4f(), FAR, false);
     let part = part_of(slab.ray, slab.near, slab.far);
     // Of two surfaces the nearer one counts.
@@ -287,7 +300,7 @@ fn find_surface(slab: Slab, image: vec4f, light: Lighting) -> Composited {
 
 // `maximum`, `minimum`, `average`: chooses among the planes' points, or means them. While there is no such point, the pixel has the colour of the
 // middle of its stretch, if the slab holds it.
-fn choose(slab: Slab, image: vec4f, before: vec4u, color_before: vec4f, light: Lighting) -> Composited {
+fn choose(slab: Slab, image: vec4f, before: vec4u, color_before: vec4f, in_open: Lighting) -> Composited {
     let plane = slab.plane;
     // A plane belongs to the slab behind it.
     let is_plane_drawn = is_drawn(plane + 0.5 * frame.slab_width);
@@ -339,6 +352,8 @@ fn choose(slab: Slab, image: vec4f, before: vec4u, color_before: vec4f, light: L
         let color = colored(mean.color, own);
         seen = Look(mean.amount * color.a, color.rgb);
     } else {
+        // A plane belongs to the slab behind it.
+        let light = lighting_in(in_open, slab, select(slab.near, sheet_depth, is_point));
         seen = look(point, point, Way(slab.at, sheet_depth, sheet_depth), own, table, light);
     }
     let alpha = min(seen.amount, 1.0);

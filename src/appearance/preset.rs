@@ -10,6 +10,7 @@ use super::quantile::quantiles;
 use super::{categories, channel_display, xray};
 #[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
+use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Compositing, Interpolation, Splatting};
 use crate::settings::transfer_function::{Ramp, TransferFunction};
@@ -76,6 +77,12 @@ impl Preset {
             // Inside a label the gradient is 0, so all light is ambient.
             Self::Labels => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
         }
+    }
+
+    /// Nothing is cut away. Where cuts open a scan, their faces show the slice's own colours; gradients there are mostly noise.
+    pub fn clip(self) -> Clip {
+        let is_scan = matches!(self, Self::CtSkin | Self::CtBone | Self::CtVessels | Self::MrHead | Self::Fusion);
+        Clip { shade_faces: !is_scan, ..Clip::default() }
     }
 
     /// How sheets become an image.

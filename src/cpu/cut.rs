@@ -41,6 +41,8 @@ pub(super) struct RayMode {
     pub(super) rays: PixelRays,
     /// The half spaces that are kept; `None` if nothing is cut.
     kept: Option<Vec<HalfSpace>>,
+    /// As many of the first of these are cuts whose faces are not shaded.
+    unshaded: usize,
     surfaces: Option<Surfaces>,
     means: Option<Means>,
     /// The box around the volume's voxels and their neighbourhoods.
@@ -57,7 +59,12 @@ pub(super) struct TileRays {
     pub(super) weights: Option<PixelValues>,
     /// The range of the middles of slabs that count; `None` if all do.
     pub(super) counted: Option<Vec<[[f32; COLUMNS]; 2]>>,
+    /// The slabs in which rays enter through cuts whose faces are not shaded; `None` if there are no such cuts.
+    pub(super) faces: Option<Vec<[Option<i32>; COLUMNS]>>,
 }
+
+/// The slack in slabs for rays that enter where two slabs meet, which is in the farther one.
+const HAIR_OF_FACE: f64 = 1e-9;
 
 impl RayMode {
     pub(super) fn new(scene: &Scene, view: &ViewGeometry, grid: &Grid, surfaces: Option<Surfaces>) -> Self {
@@ -65,15 +72,30 @@ impl RayMode {
         Self {
             rays: PixelRays::new(view, grid),
             kept: (surfaces.is_some() || !scene.clip.is_empty()).then(|| scene.clip.half_spaces(grid)),
+            unshaded: 0,
             surfaces,
             means: compositing.is_by_means().then(|| Means::new(view, grid, &scene.splatting)),
             volume: around(grid),
         }
     }
 
-    /// Only the parts of rays within some half spaces, and in front of surfaces, are visible.
-    pub(super) fn within(view: &ViewGeometry, grid: &Grid, kept: Vec<HalfSpace>, surfaces: Option<Surfaces>) -> Self {
-        Self { rays: PixelRays::new(view, grid), kept: Some(kept), surfaces, means: None, volume: around(grid) }
+    /// Only the parts of rays within some half spaces, and in front of surfaces, are visible. As many of the first half spaces are cuts whose faces
+    /// are not shaded.
+    pub(super) fn within(
+        view: &ViewGeometry,
+        grid: &Grid,
+        (kept, unshaded): (Vec<HalfSpace>, usize),
+        surfaces: Option<Surfaces>,
+    ) -> Self {
+        let rays = PixelRays::new(view, grid);
+        Self { rays, kept: Some(kept), unshaded, surfaces, means: None, volume: around(grid) }
+    }
+
+    /// The slab in which a ray enters through a cut whose face is not shaded.
+    fn face(&self, ray: &PixelRay) -> Option<i32> {
+        let (cuts, others) = self.kept.as_deref().unwrap_or_default().split_at(self.unshaded);
+        let start = ray.inside(cuts).start;
+        (start > ray.inside(others).start).then(|| (ray.slab(start) + HAIR_OF_FACE).floor() as i32)
     }
 
     /// The range of depths at which a pixel's ray shows something.
@@ -124,6 +146,11 @@ impl RayMode {
                 .as_ref()
                 .filter(|means| means.is_choosy())
                 .map(|means| ends(&|ray, shown| means.counted(ray, shown))),
+            faces: (self.unshaded > 0).then(|| {
+                let mut rows = vec![[None; COLUMNS]; ROWS];
+                self.each_pixel(origin, |ray, _, [x, y]| rows[y][x] = self.face(ray));
+                rows
+            }),
         }
     }
 

@@ -31,6 +31,7 @@ use crate::lists::quad_plan::{Overlaps, PlaceDepths, tile_grid};
 use crate::parallel::prelude::*;
 use crate::part::{Content, Extreme, Resolver};
 use crate::scene::Scene;
+use crate::settings::clip::CutCells;
 use crate::settings::splatting::{Classification, Compositing, Method, Order};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
@@ -47,6 +48,8 @@ pub(super) struct Frame<'a> {
     pub(super) shader: Shader,
     /// The light sheets, if there are any.
     pub(super) lights: Option<Arc<Lights>>,
+    /// The cells of voxels that are not shaded, because cuts go through them.
+    pub(super) cut_cells: Option<CutCells>,
     pub(super) compositor: Compositor,
     pub(super) rays: RayMode,
     pub(super) drawn: Drawn,
@@ -183,6 +186,7 @@ impl<'a> Frame<'a> {
             splatter,
             shader: Shader::new(&scene.shading, &scene.camera.basis(), splatting.compositing),
             lights,
+            cut_cells: scene.clip.unshaded_cells(grid),
             compositor,
             rays: RayMode::new(scene, &view, grid, surfaces),
             drawn: drawn.renewed(bricks, &view),

@@ -91,8 +91,13 @@ impl PixelRay {
         if self.slabs_per_depth == 0.0 {
             return Some([f64::NEG_INFINITY, f64::INFINITY]);
         }
-        let [a, b] = [depths.start, depths.end].map(|depth| self.slab_at_origin + self.slabs_per_depth * depth);
+        let [a, b] = [depths.start, depths.end].map(|depth| self.slab(depth));
         Some([a.min(b), a.max(b)])
+    }
+
+    /// Where among slabs the ray is at a depth.
+    pub(super) fn slab(&self, depth: f64) -> f64 {
+        self.slab_at_origin + self.slabs_per_depth * depth
     }
 
     /// The depth of a place among slabs.

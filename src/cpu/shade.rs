@@ -1,11 +1,11 @@
 //! Shading (SPEC §3) of eight voxels at a time, once for every tile in which a voxel is visible, as in `shaders/shade.wgsl`.
 
-use fearless_simd::f32x8;
 use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, mask32x8};
 use glam::DVec3;
 
 use super::material::Material;
-use super::vector::{LANES, optical_depth, power};
+use super::vector::{LANES, mask, optical_depth, power};
 use crate::light::Left;
 use crate::settings::camera::ViewBasis;
 use crate::settings::shading::{MAX_SHADING, Shading};
@@ -23,6 +23,8 @@ pub(super) struct Unshaded {
     scale: [f32; LANES],
     /// The shares that are left of ambient and of other light (SPEC §14).
     left: [[f32; LANES]; 2],
+    /// The bits of lanes that are not shaded, because a cut goes through them.
+    faces: u32,
 }
 
 impl Unshaded {
@@ -36,6 +38,7 @@ impl Unshaded {
             to_eye: [zero; 3],
             scale: zero,
             left: [[1.0; LANES]; 2],
+            faces: 0,
         }
     }
 
@@ -43,6 +46,12 @@ impl Unshaded {
     #[inline(always)]
     pub(super) fn set_left(&mut self, lane: usize, Left { ambient, direct }: Left) {
         (self.left[0][lane], self.left[1][lane]) = (ambient, direct);
+    }
+
+    /// Says which lanes have voxels that a cut goes through.
+    #[inline(always)]
+    pub(super) fn set_faces(&mut self, faces: u32) {
+        self.faces = faces;
     }
 
     /// Puts a voxel's material into a lane.
@@ -63,6 +72,12 @@ impl Unshaded {
             self.to_eye[axis][lane] = to_eye[axis] as f32;
         }
     }
+}
+
+/// A colour where a mask is set, and another one elsewhere.
+#[inline(always)]
+pub(super) fn select<S: Simd>(is: mask32x8<S>, one: [f32x8<S>; 3], other: [f32x8<S>; 3]) -> [f32x8<S>; 3] {
+    std::array::from_fn(|channel| is.select(one[channel], other[channel]))
 }
 
 /// A frame's light, material and compositing.
@@ -103,7 +118,9 @@ impl Shader {
         } * load(&voxels.scale);
         let of = |[x, y, z]: &[[f32; LANES]; 3]| [load(x), load(y), load(z)];
         let left = [load(&voxels.left[0]), load(&voxels.left[1])];
-        let [red, green, blue] = self.color(simd, of(&voxels.color), of(&voxels.normal), of(&voxels.to_eye), left);
+        let color = of(&voxels.color);
+        let shaded = self.color(simd, color, of(&voxels.normal), of(&voxels.to_eye), left);
+        let [red, green, blue] = select(mask(simd, voxels.faces), color, shaded);
         [(red * amount).to_array(), (green * amount).to_array(), (blue * amount).to_array(), amount.to_array()]
     }
 

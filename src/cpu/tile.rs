@@ -381,16 +381,24 @@ impl<'a> TileWalk<'a> {
         voxels
     }
 
-    /// Looks up what is left of light at each of some voxels.
+    /// Looks up what is left of light at each of some voxels, and which of them cuts go through.
     // Not inlined, so that it is compiled once for all instruction sets.
     #[inline(never)]
     fn light_batch(&self, batch: &mut Batch<'_>, count: usize) {
-        let Some(lights) = &self.frame.lights else { return };
+        let Frame { lights, cut_cells, .. } = self.frame;
+        if lights.is_none() && cut_cells.is_none() {
+            return;
+        }
+        let mut faces = 0;
         for lane in 0..count {
             let [brick, slot] = batch.splats[lane].voxel;
-            let voxel = brick::origin(&self.arrived[brick as usize].brick) + brick::in_brick(slot);
-            batch.unshaded.set_left(lane, lights.left(voxel.as_dvec3()));
+            let voxel = (brick::origin(&self.arrived[brick as usize].brick) + brick::in_brick(slot)).as_dvec3();
+            if let Some(lights) = lights {
+                batch.unshaded.set_left(lane, lights.left(voxel));
+            }
+            faces |= u32::from(cut_cells.as_ref().is_some_and(|cells| cells.contain(voxel))) << lane;
         }
+        batch.unshaded.set_faces(faces);
     }
 
     fn draw_batch<S: Simd>(&mut self, simd: S, batch: &mut Batch<'_>) {

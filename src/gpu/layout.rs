@@ -57,6 +57,9 @@ pub struct Frame {
     pub light_place: [[f32; 4]; 6],
     /// For each of the two stacks the amount, 0 if there is none, its first plane in the texture, and its last plane from there on; w is unused.
     pub light_stacks: [[f32; 4]; 2],
+    /// The planes of cuts whose faces are not shaded (SPEC §3): three matrices, whose products with (i, j, k, 1) are a voxel's distances from four planes each,
+    /// in extents of a cell along their normals. The last six planes are the crop box's faces; planes that are missing are far away.
+    pub faces: [[f32; 4]; 12],
     /// The volume's dimensions; w is unused.
     pub dims: [u32; 4],
     /// The ends of the first drawn channel's colour, opacity and gradient opacity ramps in the control points; w is unused.
@@ -171,7 +174,7 @@ pub struct Cut {
     pub has_surfaces: u32,
     /// The pixels that are drawn (SPEC §11), to the right of and below the first two numbers, to the left of and above the others.
     pub region: [f32; 4],
-    /// The sheet depths between which slabs are composited; the others unused.
+    /// The sheet depths between which slabs are composited; 1 where cut faces are not shaded, or else 0; w is unused.
     pub slabs: [f32; 4],
 }
 

@@ -19,7 +19,7 @@ use crate::lists::patch_bins::PatchBins;
 use crate::lists::quad_plan::FramePlan;
 use crate::scene::Scene;
 use crate::scene::image_settings::premultiplied;
-use crate::settings::clip::HalfSpace;
+use crate::settings::clip::{CutCells, HalfSpace, MAX_PLANES};
 use crate::settings::closing::Closing;
 use crate::settings::shading::{Light, MAX_SHADING, MIN_GRADIENT, Shading};
 use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
@@ -58,6 +58,7 @@ pub fn frame(
         gradient: (0.5 / grid.aspect()).extend(MIN_GRADIENT).as_vec4().to_array(),
         light_place: [[0.0; 4]; 6],
         light_stacks: [[0.0; 4]; 2],
+        faces: faces(scene.clip.unshaded_cells(grid).as_ref()),
         dims: grid.dims.extend(0).to_array(),
         ramps: [color_end, opacity_end, gradient_opacity_end, 0],
         size: view.size,
@@ -88,6 +89,20 @@ pub fn frame(
         closing: Closing::of(&scene.splatting).map_or(0.0, Closing::threshold),
     }
 }
+
+/// [`Frame::faces`].
+fn faces(cells: Option<&CutCells>) -> [[f32; 4]; 12] {
+    let mut rows = [DVec4::W * FAR_AWAY; 12];
+    if let Some(CutCells { planes, crop }) = cells {
+        rows[..planes.len()].copy_from_slice(planes);
+        rows[MAX_PLANES..][..crop.len()].copy_from_slice(crop);
+    }
+    let of_matrix = |matrix: usize, column: usize| [0, 1, 2, 3].map(|row| rows[4 * matrix + row][column] as f32);
+    std::array::from_fn(|at| of_matrix(at / 4, at % 4))
+}
+
+/// The distance of planes that are missing.
+const FAR_AWAY: f64 = 1e9;
 
 /// The constants of the tile rasterizer. `results` is the layout of its results.
 pub fn gather(
@@ -177,7 +192,12 @@ pub fn cut(
         plane_count: half_spaces.len() as u32,
         has_surfaces: surfaces.is_some().into(),
         region: [region.x, region.y, region.x + region.width, region.y + region.height].map(|edge| edge as f32),
-        slabs: [view.slabs.plane(slabs.start) as f32, view.slabs.plane(slabs.end) as f32, 0.0, 0.0],
+        slabs: [
+            view.slabs.plane(slabs.start) as f32,
+            view.slabs.plane(slabs.end) as f32,
+            u8::from(!clip.shade_faces).into(),
+            0.0,
+        ],
     }
 }
 

@@ -174,7 +174,7 @@ mod tests {
             ..by_value.clone()
         };
         let of_two = TransferFunction { further: vec![graded.clone()], ..by_value.clone() };
-        let cut = Clip { planes: vec![[0.5, -0.3, 0.4, 0.2]], crop: None };
+        let cut = Clip { planes: vec![[0.5, -0.3, 0.4, 0.2]], ..Clip::default() };
         for (name, volume, transfer) in [
             ("values", &volume(whole(0)), &by_value),
             ("holes", &volume(holed.collect()), &by_value),

@@ -173,6 +173,19 @@ impl Geometry {
         self.clip.iter().all(reaches)
     }
 
+    /// Whether a voxel's cell, half a voxel around its centre, meets one of the first few clip planes, or a face of the crop box that the others bound (SPEC §3).
+    pub fn is_cut(&self, voxel: UVec3, planes: usize) -> bool {
+        let (p, half) = (self.grid.world_position(voxel) / self.grid.unit(), self.grid.aspect() / 2.0);
+        // The least and the greatest distance from a plane within the cell; the slack is for cells that end at it.
+        let ends = |HalfSpace { normal, offset }: &HalfSpace| {
+            let (middle, spread) = (normal.dot(p) + offset, normal.abs().dot(half) * (1.0 + 2e-9));
+            [middle - spread, middle + spread]
+        };
+        let meets = |half_space: &HalfSpace| ends(half_space)[0] <= 0.0 && ends(half_space)[1] >= 0.0;
+        let (planes, faces) = self.clip.split_at(planes);
+        planes.iter().any(meets) || faces.iter().any(meets) && faces.iter().all(|face| ends(face)[1] >= 0.0)
+    }
+
     /// The local ray at a voxel, a unit vector: `w`, or in perspective `normalize(p - e)`.
     pub fn ray(&self, voxel: UVec3) -> DVec3 {
         if self.eye.is_some() { self.position(voxel).normalize() } else { self.basis.w }

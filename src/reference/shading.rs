@@ -77,7 +77,8 @@ pub fn emission(
             let base = volume.color(index).map_or_else(|| tables.color.at(value), DVec4::truncate);
             let gradient =
                 tables.members.map_or_else(|| volume.gradient(voxel), |of| membership::gradient(volume, of, voxel));
-            let color = color(scene, base, gradient, -geometry.ray(voxel), left);
+            let is_face = !scene.clip.shade_faces && geometry.is_cut(voxel, scene.clip.planes.len());
+            let color = if is_face { base } else { color(scene, base, gradient, -geometry.ray(voxel), left) };
             color.extend(1.0) * amount(scene.splatting.compositing, alpha)
         }
     };

@@ -1,6 +1,7 @@
 //! The preset that fits a volume, where a scene states nothing about its appearance.
 
 use crate::appearance::Preset;
+use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Splatting;
 
@@ -22,6 +23,8 @@ pub struct Fitting {
     pub shininess: bool,
     /// [`Splatting::compositing`].
     pub compositing: bool,
+    /// [`Clip::shade_faces`].
+    pub shade_faces: bool,
 }
 
 impl Fitting {
@@ -32,7 +35,16 @@ impl Fitting {
     pub const ALL: Self = Self::all(true);
 
     const fn all(is: bool) -> Self {
-        Self { is_open: is, enabled: is, ambient: is, diffuse: is, specular: is, shininess: is, compositing: is }
+        Self {
+            is_open: is,
+            enabled: is,
+            ambient: is,
+            diffuse: is,
+            specular: is,
+            shininess: is,
+            compositing: is,
+            shade_faces: is,
+        }
     }
 
     /// The shading, with a preset's where it is open.
@@ -49,6 +61,12 @@ impl Fitting {
             shininess: number(self.shininess, |shading| shading.shininess),
             ..stated
         }
+    }
+
+    /// The cuts, with a preset's shading of their faces where it is open.
+    pub(super) fn clip(self, stated: Clip, preset: Preset) -> Clip {
+        let shade_faces = stated.shade_faces && (!self.shade_faces || preset.clip().shade_faces);
+        Clip { shade_faces, ..stated }
     }
 
     /// The splatting settings, with a preset's compositing where it is open.

@@ -38,6 +38,7 @@ use crate::appearance::{Eye, Preset, categories, exceeds_digits};
 use crate::error::setting::SettingError;
 use crate::lists::extent;
 use crate::settings::camera::Camera;
+use crate::settings::clip::Clip;
 use crate::settings::framing::{Extent, Sphere};
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
@@ -243,10 +244,11 @@ impl Scene {
         let transfer = TransferSettings { preset: Some(preset), ..self.transfer.clone() };
         let shading = self.fitting.shading(self.shading, preset);
         let mut splatting = self.fitting.splatting(self.splatting, preset);
+        let clip = self.fitting.clip(self.clip.clone(), preset);
         if splatting.classification == Classification::Auto && exceeds_digits(volume) {
             splatting.classification = Classification::Before;
         }
-        Self { transfer, shading, splatting, fitting: Fitting::NONE, ..self.clone() }
+        Self { transfer, clip, shading, splatting, fitting: Fitting::NONE, ..self.clone() }
     }
 
     /// Whether the preset that fits is used.
@@ -301,7 +303,7 @@ impl Scene {
         };
         let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
         let is_open = preset.is_none() && !states_transfer && channels.len() <= 1;
-        let fitting = if is_open { tables::fitting(&shading, &splatting) } else { Fitting::NONE };
+        let fitting = if is_open { tables::fitting(&shading, &splatting, &clip) } else { Fitting::NONE };
         let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } =
             channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
         let scene = Self {
@@ -316,7 +318,7 @@ impl Scene {
             visible,
             camera: tables::camera(camera, camera_by_default)?,
             image: tables::image(image)?,
-            clip: tables::clip(clip)?,
+            clip: tables::clip(clip, preset.map_or_else(Clip::default, Preset::clip))?,
             transfer,
             further: channels.collect(),
             shading: tables::shading(shading, preset.map_or_else(Shading::default, Preset::shading))?,

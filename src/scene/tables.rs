@@ -240,11 +240,11 @@ pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
     Ok(image)
 }
 
-/// Reads `[clip]`.
-pub(super) fn clip(mut section: Section) -> Result<Clip, SceneError> {
-    let mut clip = Clip::default();
+/// Reads `[clip]` over a preset's values.
+pub(super) fn clip(mut section: Section, mut clip: Clip) -> Result<Clip, SceneError> {
     section.read("planes", &mut clip.planes, planes)?;
     section.read("crop", &mut clip.crop, |entry| crop(entry).map(Some))?;
+    section.read("shade_faces", &mut clip.shade_faces, Entry::boolean)?;
     let origins = section.origins;
     section.finish()?;
     clip.check().map_err(|error| origins.refused(error))?;
@@ -338,7 +338,7 @@ pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shad
 }
 
 /// The choices that are left to a preset in `[shading]` and `[splatting]`: the keys that are missing.
-pub(super) fn fitting(shading: &Section, splatting: &Section) -> Fitting {
+pub(super) fn fitting(shading: &Section, splatting: &Section, clip: &Section) -> Fitting {
     let is_open = |key: &str| !shading.states(key);
     Fitting {
         is_open: true,
@@ -348,6 +348,7 @@ pub(super) fn fitting(shading: &Section, splatting: &Section) -> Fitting {
         specular: is_open("specular"),
         shininess: is_open("shininess"),
         compositing: !splatting.states("compositing"),
+        shade_faces: !clip.states("shade_faces"),
     }
 }
 

@@ -49,9 +49,11 @@ impl Scene {
             write_camera(&mut text, camera);
         }
         write_image(&mut text, image);
-        write_clip(&mut text, clip);
         // Settings that the preset that fits is to choose are not written.
         let fitting = if self.is_fitting() { *fitting } else { Fitting::NONE };
+        let unstated = transfer.preset.map_or_else(Clip::default, Preset::clip).shade_faces;
+        let leaves_faces = clip.shade_faces == unstated && fitting.is_open <= fitting.shade_faces;
+        write_clip(&mut text, clip, leaves_faces);
         write_shading(&mut text, shading, fitting);
         write_splatting(&mut text, splatting, fitting);
         Ok(text.text)
@@ -194,12 +196,17 @@ fn write_image(text: &mut Text, image: &ImageSettings) {
     text.line("background", numbers(background));
 }
 
-fn write_clip(text: &mut Text, clip: &Clip) {
-    let Clip { planes, crop } = clip;
-    if !planes.is_empty() || crop.is_some() {
-        text.table("clip");
-        text.line("planes", planes.iter().map(|&plane| numbers(plane)).collect::<Vec<_>>());
-        text.given("crop", crop.map(|corners| corners.map(vector).to_vec()));
+fn write_clip(text: &mut Text, clip: &Clip, leaves_faces: bool) {
+    let Clip { planes, crop, shade_faces } = clip;
+    if clip.is_empty() && leaves_faces {
+        return;
+    }
+    text.table("clip");
+    text.line("planes", planes.iter().map(|&plane| numbers(plane)).collect::<Vec<_>>());
+    text.given("crop", crop.map(|corners| corners.map(vector).to_vec()));
+    // Scenes that do not state it stay as they were, and so do the fingerprints of their parts.
+    if !leaves_faces {
+        text.line("shade_faces", *shade_faces);
     }
 }
 

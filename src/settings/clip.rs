@@ -4,8 +4,9 @@
 //! fraction of its slab that the stretch covers. Cuts are as fine as slabs in any direction, and move without steps. Voxels whose
 //! kernels lie entirely outside do not take part.
 //!
-//! A cut face shows the opened inside in its own colours: gradients are those of the whole volume, and the plane's normal does not shade
-//! the face. The face is as soft as kernels: a voxel in front of the plane is visible as far as its kernel reaches behind it.
+//! A cut face shows the opened inside: gradients are those of the whole volume, and the plane's normal does not shade the face; without
+//! [`Clip::shade_faces`] it has the slice's own colours. The face is as soft as kernels: a voxel in front of the plane is visible as far as its
+//! kernel reaches behind it.
 
 use std::ops::Range;
 
@@ -18,12 +19,44 @@ use crate::volume::Grid;
 pub const MAX_PLANES: usize = 6;
 
 /// What is cut away; nothing by default. A point is kept if it lies inside all planes and the box.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Clip {
     /// At most [`MAX_PLANES`] planes; `[nx, ny, nz, d]` keeps the world points p with `n·p + d ≥ 0`. Normals have any length except 0.
     pub planes: Vec<[f64; 4]>,
     /// The corners of the box that is kept, the lower one first, in world units.
     pub crop: Option<[DVec3; 2]>,
+    /// Whether cut faces are shaded, by gradients of the whole volume, which emboss noise (SPEC §3). If not, a voxel whose cell meets a plane or a
+    /// face of the box has its colour as it is, and with classification after splatting the slab in which a ray enters through a cut.
+    pub shade_faces: bool,
+}
+
+/// The cells that planes and the faces of a crop box cut through: those of voxels at cut faces (SPEC §3).
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct CutCells {
+    /// Rows whose products with (i, j, k, 1) are a voxel's distances from the planes, in extents of a cell along their normals.
+    pub(crate) planes: Vec<DVec4>,
+    /// The same for the box's six faces, positive inside; empty without a box.
+    pub(crate) crop: Vec<DVec4>,
+}
+
+/// The slack of distances from planes in extents of cells, for those that meet a cell's very end.
+const HAIR_OF_FACE: f64 = 1e-9;
+
+impl CutCells {
+    /// Whether one is a voxel's.
+    pub(crate) fn contain(&self, voxel: DVec3) -> bool {
+        let distance = |row: &DVec4| row.dot(voxel.extend(1.0));
+        let meets = |row: &DVec4| distance(row).abs() <= 0.5 + HAIR_OF_FACE;
+        let touches_box = || self.crop.iter().all(|row| distance(row) >= -0.5 - HAIR_OF_FACE);
+        self.planes.iter().any(meets) || (self.crop.iter().any(meets) && touches_box())
+    }
+}
+
+impl Default for Clip {
+    /// Nothing is cut away, and cut faces would be shaded.
+    fn default() -> Self {
+        Self { planes: Vec::new(), crop: None, shade_faces: true }
+    }
 }
 
 /// One side of a plane, in `unit`s (SPEC §2): `normal·p + offset ≥ 0`, with a normal of length 1.
@@ -88,6 +121,20 @@ impl Clip {
             .chain(crop)
             .map(|(normal, offset)| HalfSpace { normal, offset: (offset + normal.dot(grid.place())) / unit })
             .collect()
+    }
+
+    /// The cells of voxels that are not shaded because cuts go through them; `None` if cut faces are shaded, or nothing is cut.
+    pub(crate) fn unshaded_cells(&self, grid: &Grid) -> Option<CutCells> {
+        if self.shade_faces || self.is_empty() {
+            return None;
+        }
+        let row = |HalfSpace { normal, offset }| {
+            let steps = normal * grid.aspect();
+            steps.extend(offset - steps.dot(grid.center())) / steps.abs().element_sum()
+        };
+        let mut planes: Vec<DVec4> = self.half_spaces(grid).into_iter().map(row).collect();
+        let crop = planes.split_off(self.planes.len());
+        Some(CutCells { planes, crop })
     }
 
     /// The voxels that may be visible: those whose kernels, with a radius in grid units, reach inside.
@@ -177,6 +224,26 @@ mod tests {
     }
 
     #[test]
+    fn cut_cells_are_those_that_planes_and_faces_meet() {
+        // Cells along x end at -9, -7, … 9. The plane lies within voxel 4's, whose centre is 0; the next one ends where voxels 6 and 7 meet.
+        let cells = |clip: Clip| Clip { shade_faces: false, ..clip }.unshaded_cells(&grid()).unwrap();
+        let along_x = |cells: &CutCells, y: f64| -> Vec<u32> {
+            (0..9).filter(|&x| cells.contain(DVec3::new(f64::from(x), y, 2.0))).collect()
+        };
+        let plane = |d: f64| Clip { planes: vec![[3.0, 0.0, 0.0, 3.0 * d]], ..Clip::default() };
+        assert_eq!(along_x(&cells(plane(0.5)), 0.0), [4]);
+        assert_eq!(along_x(&cells(plane(-5.0)), 6.0), [6, 7]);
+        // The box's faces across x, and all voxels beside that across y, which ends at 3 within voxel 4's cells.
+        let crop = Some([DVec3::new(-4.5, -1e9, -1e9), DVec3::new(0.5, 3.0, 1e9)]);
+        let cells = cells(Clip { crop, ..Clip::default() });
+        assert_eq!(along_x(&cells, 3.0), [2, 4]);
+        assert_eq!(along_x(&cells, 4.0), [2, 3, 4]);
+        assert_eq!(along_x(&cells, 6.0), [0u32; 0]);
+        assert!(plane(0.5).unshaded_cells(&grid()).is_none());
+        assert!(Clip { shade_faces: false, ..Clip::default() }.unshaded_cells(&grid()).is_none());
+    }
+
+    #[test]
     fn rows_are_what_voxels_are() {
         let grid = grid();
         for at in 0..200 {
@@ -186,7 +253,8 @@ mod tests {
                 [sine, cosine * factor.sin(), (angle + factor).sin(), 6.0 * (angle * factor).cos()]
             });
             let crop = (at % 3 == 0).then_some([DVec3::splat(-5.0), DVec3::splat(4.0)]);
-            let voxels = Clip { planes: planes.to_vec(), crop }.voxels(&grid, 0.5 + f64::from(at % 4));
+            let voxels =
+                Clip { planes: planes.to_vec(), crop, ..Clip::default() }.voxels(&grid, 0.5 + f64::from(at % 4));
             for (y, z) in (0..7).flat_map(|y| (0..5).map(move |z| (y, z))) {
                 let each: Vec<u32> = (0..9).filter(|&x| voxels.contain(UVec3::new(x, y, z))).collect();
                 assert_eq!(voxels.in_row(y, z, 9).collect::<Vec<u32>>(), each, "{planes:?} {crop:?}");
@@ -196,8 +264,8 @@ mod tests {
 
     #[test]
     fn what_is_no_plane_or_box_is_refused() {
-        let planes = |planes: &[[f64; 4]]| Clip { planes: planes.to_vec(), crop: None };
-        let crop = |low: DVec3, high: DVec3| Clip { planes: Vec::new(), crop: Some([low, high]) };
+        let planes = |planes: &[[f64; 4]]| Clip { planes: planes.to_vec(), ..Clip::default() };
+        let crop = |low: DVec3, high: DVec3| Clip { crop: Some([low, high]), ..Clip::default() };
         planes(&[[1e-200, 0.0, 0.0, 1e-200]; 6]).check().unwrap();
         crop(DVec3::ZERO, DVec3::ONE).check().unwrap();
         for (clip, words) in [

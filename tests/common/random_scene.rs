@@ -310,6 +310,8 @@ fn clip(random: &mut Random, grid: &Grid) -> Clip {
     if one_in(random, 6) {
         clip.crop = Some([-half * random.uniform(0.2, 1.1), half * random.uniform(0.2, 1.1)]);
     }
+    // A generator of its own, so that scenes stay the same but for this.
+    clip.shade_faces = one_in(&mut Random(random.0 ^ 0x51ab), 2);
     clip
 }
 

@@ -62,7 +62,8 @@ fn random_clip(random: &mut Random, grid: &Grid) -> Clip {
         let low = random.within(-half, DVec3::ZERO);
         [low, low + random.within(grid.spacing, half * 1.5 + grid.spacing)]
     });
-    Clip { planes, crop }
+    let shade_faces = count != 1;
+    Clip { planes, crop, shade_faces }
 }
 
 /// The depths of a host's wavy surface around the volume's middle, with gaps.
@@ -327,8 +328,8 @@ fn moved_planes_are_fresh_ones() {
         assert_eq!(changed, fresh, "step {step}: {:?}", scene.clip);
     }
     // Half a head is left.
-    let touched = view.set_clip(Clip { planes: vec![[0.0, 1.0, 0.0, 0.0]], crop: None }).unwrap();
-    let again = view.set_clip(Clip { planes: vec![[0.0, 7.0, 0.0, 0.0]], crop: None }).unwrap();
+    let touched = view.set_clip(Clip { planes: vec![[0.0, 1.0, 0.0, 0.0]], ..Clip::default() }).unwrap();
+    let again = view.set_clip(Clip { planes: vec![[0.0, 7.0, 0.0, 0.0]], ..Clip::default() }).unwrap();
     assert!(touched.entered + touched.left > 0);
     assert_eq!((again.entered, again.left), (0, 0), "the same plane");
 }

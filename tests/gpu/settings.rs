@@ -378,6 +378,6 @@ fn errors_carry_numbers() {
     assert_eq!((key.as_str(), found), ("camera.height", Found::Number(-2.0)));
     let Allowed::Interval(Interval { min, max, .. }) = allowed else { panic!("{allowed}") };
     assert_eq!((min, max), (std::ops::Bound::Excluded(0.0), std::ops::Bound::Unbounded));
-    let clip = Clip { planes: vec![[0.0, 0.0, 0.0, 4.0]], crop: None };
+    let clip = Clip { planes: vec![[0.0, 0.0, 0.0, 4.0]], ..Clip::default() };
     assert_eq!(clip.check().unwrap_err().found, Found::Numbers(vec![0.0, 0.0, 0.0, 4.0]));
 }

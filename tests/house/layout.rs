@@ -86,6 +86,7 @@ fn shared() -> [Layout; 17] {
             gradient,
             light_place,
             light_stacks,
+            faces,
             dims,
             ramps,
             size,

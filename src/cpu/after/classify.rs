@@ -13,6 +13,7 @@ use crate::after::slab_integral;
 use crate::cpu::count::bits;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::cut::TileRays;
+use crate::cpu::shade;
 use crate::cpu::sheets::{Buffers, CHANNELS, COLUMNS, ROWS};
 use crate::cpu::vector::{LANES, mask};
 use crate::settings::splatting::Compositing;
@@ -62,6 +63,15 @@ impl<'a> Looks<'a> {
             None => f32x8::splat(simd, frame.to_eye[axis]),
             Some(rows) => f32x8::from_slice(simd, &rows[row][axis][column..column + LANES]),
         })
+    }
+
+    /// Which of eight pixels' rays enter through a cut, whose face is not shaded, in a slab.
+    #[inline(always)]
+    pub(super) fn faces(&self, lanes: u32, [column, row]: [usize; 2], slab: impl Fn(usize) -> i32) -> u32 {
+        let Some(faces) = &self.rays.faces else { return 0 };
+        bits(lanes.into())
+            .map(|lane| lane as usize)
+            .fold(0, |found, lane| found | u32::from(faces[row][column + lane] == Some(slab(lane))) << lane)
     }
 
     /// The middles of the stretches of eight rays in a slab, in slabs.
@@ -326,6 +336,7 @@ impl Frame<'_> {
         let (mut lanes, mut values) = (slab.lanes, slab.values);
         let (mut own, mut gradients, mut amounts) = (None, [[zero; 3]; 2], [None; 2]);
         let mut middle = zero;
+        let faces = looks.faces(lanes, [column, row], |_| slab.number);
         // The whole slab, which tells what is visible, and then the halves of the cubic profile: one place for all, because much is compiled into it.
         for step in 0..=2 {
             let means = self.means_between(simd, (lanes, step == 0 && self.segments > 1), values, &labels);
@@ -356,7 +367,8 @@ impl Frame<'_> {
                 let share = means.share * part[1] + part[0];
                 let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * share);
                 let left = self.left_between(simd, visible, (looks, planes), [column, row], share);
-                color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
+                let shaded = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
+                color = shade::select(mask(simd, faces), color, shaded);
                 if self.has_gradient_opacity {
                     let length = self.length(gradient);
                     let factors: [f32; LANES] = std::array::from_fn(|lane| {

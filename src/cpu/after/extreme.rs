@@ -7,6 +7,7 @@ use super::classify::Looks;
 use super::frame::Frame;
 use super::planes::Plane;
 use crate::cpu::cut::TileRays;
+use crate::cpu::shade;
 use crate::cpu::sheets::{Buffers, COLUMNS, ROWS};
 use crate::cpu::vector::{LANES, mask};
 use crate::part::Extreme;
@@ -288,7 +289,9 @@ impl Frame<'_> {
         let mut color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
         if !is_average {
             let left = self.left(simd, lanes, looks, [column, row], |lane| looks.rays.slab(places[lane]));
-            color = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
+            let shaded = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
+            let faces = looks.faces(lanes, [column, row], |lane| looks.rays.slab(places[lane]).floor() as i32);
+            color = shade::select(mask(simd, faces), color, shaded);
         }
         let alpha = f32x8::load_array(simd, alphas);
         let [red, green, blue] = color.map(|channel| channel * alpha);

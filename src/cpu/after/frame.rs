@@ -118,6 +118,7 @@ impl<'a> Frame<'a> {
         let tables = tables.map(|&label| transfer.tables(Some(label))).chain([transfer.tables(None)]);
         let has_gradient_opacity = tables.into_iter().any(|tables| tables.gradient_opacity.is_some());
         let segments = splatting.segments() as usize;
+        let unshaded = if scene.clip.shade_faces { 0 } else { scene.clip.half_spaces(&grid).len() };
         let mut drawn = Vec::new();
         if let Matter::Whole { coefficients, .. } = matter {
             drawn.resize_with(placement.bricks().element_product() as usize, || AtomicU8::new(0));
@@ -150,7 +151,7 @@ impl<'a> Frame<'a> {
                 first_hit: first_hit.map(|opacity| opacity as f32),
             },
             sheets_per_test: sheets_per_test(splatting.slab_width) as i32,
-            rays: RayMode::within(&view, &grid, counted(&view, &scene.clip, &grid), surfaces),
+            rays: RayMode::within(&view, &grid, (counted(&view, &scene.clip, &grid), unshaded), surfaces),
             drawn,
             compositing: splatting.compositing,
             is_bounded: splatting.culling,

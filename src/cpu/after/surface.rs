@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::classify::{Looks, Slab};
 use super::frame::Frame;
 use super::planes::Plane;
+use crate::cpu::shade;
 use crate::cpu::sheets::Buffers;
 use crate::cpu::vector::{LANES, mask};
 use crate::settings::transfer_function::Tables;
@@ -103,7 +104,9 @@ impl Frame<'_> {
         let gradient = std::array::from_fn(|axis| near[axis] + (far[axis] - near[axis]) * place);
         let color = colors.each_ref().map(|channel| f32x8::load_array_ref(simd, channel));
         let left = self.left_between(simd, found, (looks, planes), [column, row], place);
-        let [red, green, blue] = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
+        let shaded = self.shaded(simd, color, gradient, looks.to_eye(simd, self, [column, row]), left);
+        let faces = looks.faces(found, [column, row], |_| slab.number);
+        let [red, green, blue] = shade::select(mask(simd, faces), color, shaded);
         let is_found = mask(simd, found);
         let put = |pixels: &mut [f32], new: f32x8<S>| {
             let old = f32x8::from_slice(simd, pixels);

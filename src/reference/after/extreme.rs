@@ -4,7 +4,6 @@ use glam::{DVec3, DVec4};
 
 use super::pixel::{Composited, Pixel};
 use crate::part::Extreme;
-use crate::reference::shading;
 use crate::settings::splatting::Compositing;
 
 /// A position on a pixel's ray, with the field there.
@@ -45,7 +44,7 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
         base.extend(1.0) * alpha * opacity
     } else {
         let alpha = tables.alpha(value, gradient.length());
-        shading::color(scene, base, gradient, pixel.to_eye(), pixel.left(sheet)).extend(1.0) * alpha * opacity
+        pixel.shaded(base, gradient, (sheet.floor() as i32, sheet)).extend(1.0) * alpha * opacity
     };
     let first_hit = pixel.frame().host.first_hit.filter(|&opacity| color.w >= opacity).map(|_| sheet);
     Composited { color, first_hit, extreme: Extreme { value: kept as f32, counted, label: 0.0 }, own }

@@ -10,7 +10,6 @@ use super::slab_integral::SlabIntegral;
 use crate::geometry::pixel_ray::HAIR_OF_CELL;
 use crate::part::Extreme;
 use crate::reference::cut::{self, PixelRay};
-use crate::reference::light::Left;
 use crate::reference::means::volume_box;
 use crate::reference::shading;
 use crate::settings::splatting::SlabProfile;
@@ -25,7 +24,12 @@ pub struct Pixel<'a> {
     stretch: Range<f64>,
     /// The length of the ray from plane to plane in `unit`s.
     length_per_sheet: f64,
+    /// The slab in which the ray enters through a cut whose face is not shaded (SPEC §3).
+    face: Option<i32>,
 }
+
+/// The slack in sheets for rays that enter where two slabs meet, which is in the farther one.
+const HAIR_OF_FACE: f64 = 1e-9;
 
 /// The field at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +105,10 @@ impl<'a> Pixel<'a> {
         let (start, end) = (cells.start.max(shown.start).max(near), cells.end.min(shown.end));
         let stretch = if start < end { ray.sheet(geometry, start)..ray.sheet(geometry, end) } else { 0.0..0.0 };
         let depth_per_sheet = ray.depth(geometry, 1.0) - ray.depth(geometry, 0.0);
-        Self { frame, length_per_sheet: ray.along.length() * depth_per_sheet, ray, stretch }
+        let cut = ray.inside(&geometry.clip).start;
+        let is_face = !frame.scene.clip.shade_faces && cut > cells.start.max(near);
+        let face = is_face.then(|| (ray.sheet(geometry, cut) + HAIR_OF_FACE).floor() as i32);
+        Self { frame, length_per_sheet: ray.along.length() * depth_per_sheet, ray, stretch, face }
     }
 
     /// The visible stretch of the ray, in sheets.
@@ -132,9 +139,12 @@ impl<'a> Pixel<'a> {
         self.ray.origin + self.ray.depth(&self.frame.geometry, sheet) * self.ray.along
     }
 
-    /// The light that is left at a position on the ray.
-    pub(super) fn left(&self, sheet: f64) -> Left {
-        self.frame.lights.left(self.position(sheet))
+    /// A colour shaded by a gradient at a position on the ray in a slab, unless the ray enters the slab through a cut whose face is not shaded.
+    pub(super) fn shaded(&self, color: DVec3, gradient: DVec3, (slab, sheet): (i32, f64)) -> DVec3 {
+        if self.face == Some(slab) {
+            return color;
+        }
+        shading::color(&self.frame.scene, color, gradient, self.to_eye(), self.frame.lights.left(self.position(sheet)))
     }
 
     /// The unit vector towards the eye.
@@ -257,7 +267,7 @@ impl<'a> Pixel<'a> {
                 let place = ends[0] + (ends[1] - ends[0]) * means.share;
                 let gradient = near.lerp(far, place);
                 amount *= tables.gradient_opacity.map_or(1.0, |ramp| ramp.at(gradient.length()));
-                color = shading::color(scene, color, gradient, self.to_eye(), self.left(first + place));
+                color = self.shaded(color, gradient, (slab.number, first + place));
             }
             let length = (part.end - part.start) * self.length_per_sheet;
             (part, color.extend(1.0) * amount * length)

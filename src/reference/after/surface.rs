@@ -7,7 +7,6 @@ use glam::{DVec3, DVec4};
 
 use super::pixel::{Composited, Pixel, Slab};
 use super::slab_integral::knots;
-use crate::reference::shading;
 use crate::settings::transfer_function::Tables;
 
 /// The opacity at a surface.
@@ -51,9 +50,8 @@ fn in_slab(pixel: &Pixel, slab: &Slab) -> Option<Composited> {
             let tables = pixel.tables(first + (start + end) / 2.0);
             let line = Line { tables, values: [start, end].map(value), start, end, opacity };
             if let Some(t) = line.first_surface(&gradient) {
-                let scene = &pixel.frame().scene;
                 let base = own.map_or_else(|| tables.color.at(value(t)), DVec4::truncate);
-                let color = shading::color(scene, base, gradient(t), pixel.to_eye(), pixel.left(first + t)).extend(1.0);
+                let color = pixel.shaded(base, gradient(t), (slab.number, first + t)).extend(1.0);
                 return Some(Composited::new(color, pixel.frame().host.first_hit.map(|_| first + t)));
             }
         }

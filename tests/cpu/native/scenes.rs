@@ -24,7 +24,7 @@ fn change(scene: &mut Scene, random: &mut Random) {
             let low = random.uniform(20.0, 120.0);
             scene.transfer = transfer(&[(0.0, [0.9, 0.7, 0.5]), (255.0, [1.0; 3])], &[(low, 0.0), (low + 30.0, 0.8)]);
         }
-        4 => scene.clip = Clip { planes: vec![[1.0, 0.2, 0.0, random.uniform(-4.0, 4.0)]], crop: None },
+        4 => scene.clip = Clip { planes: vec![[1.0, 0.2, 0.0, random.uniform(-4.0, 4.0)]], ..Clip::default() },
         5 => *classification = random.pick(&[Classification::Before, Classification::After]),
         6 => {
             *compositing = random.pick(&[

@@ -99,6 +99,7 @@ fn every_key() {
         [clip]
         planes = [[0, 0, 2, -1], [1, 0.5, 0, 3]]
         crop = [[-1, -2, -3], [4, 5, 6.5]]
+        shade_faces = false
         [transfer]
         color = [[-1, [0, 0, 0]], [80.5, [0.9, 0.7, 1]]]
         opacity = [[40, 0], [60, 0.8]]
@@ -171,6 +172,7 @@ fn every_key() {
         clip: Clip {
             planes: vec![[0.0, 0.0, 2.0, -1.0], [1.0, 0.5, 0.0, 3.0]],
             crop: Some([DVec3::new(-1.0, -2.0, -3.0), DVec3::new(4.0, 5.0, 6.5)]),
+            shade_faces: false,
         },
         transfer: TransferSettings {
             color: Some(Ramp::new(vec![(-1.0, DVec3::ZERO), (80.5, DVec3::new(0.9, 0.7, 1.0))]).unwrap()),

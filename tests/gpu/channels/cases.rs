@@ -88,7 +88,7 @@ fn what_is_cut_away_is_cut_from_all_channels() {
         let half = (volume.dims().as_dvec3() - 1.0) * volume.spacing() / 2.0;
         let normal = random.direction();
         let planes = vec![[normal.x, normal.y, normal.z, random.uniform(0.0, 0.4) * half.min_element()]];
-        scene.clip = Clip { planes, crop: Some([half * -0.9, half * random.uniform(0.3, 0.8)]) };
+        scene.clip = Clip { planes, crop: Some([half * -0.9, half * random.uniform(0.3, 0.8)]), ..Clip::default() };
         assert_like_the_twin(&volume, &scene, &format!("{classification:?} {compositing:?}"));
     }
 }

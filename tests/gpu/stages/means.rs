@@ -51,7 +51,8 @@ fn random_view(random: &mut Random, compositing: Compositing) -> (Grid, Seen) {
     }
     if random.bits().is_multiple_of(2) {
         let normal = random.direction();
-        scene.clip = Clip { planes: vec![[normal.x, normal.y, normal.z, random.uniform(-1.0, 4.0)]], crop: None };
+        scene.clip =
+            Clip { planes: vec![[normal.x, normal.y, normal.z, random.uniform(-1.0, 4.0)]], ..Clip::default() };
     }
     let seen = Seen::new(&grid, scene);
     (grid, seen)

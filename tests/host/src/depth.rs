@@ -148,7 +148,7 @@ fn walls_cut_as_clip_planes_do() {
 
     let whole = headless(&seen());
     let normal = wall().0;
-    let clip = Clip { planes: vec![[-normal.x, -normal.y, -normal.z, 0.0]], crop: None };
+    let clip = Clip { planes: vec![[-normal.x, -normal.y, -normal.z, 0.0]], ..Clip::default() };
     let before = headless(&Scene { clip, ..seen() });
     let mut shows = [0; 2];
     for (at, actual) in actual.iter().enumerate() {
