@@ -191,7 +191,7 @@ fn rgb(color: [f64; 3]) -> Option<Ramp<DVec3>> {
 }
 
 /// Tables that differ from the main one in every possible way.
-fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
+fn tables(labels: &[u16]) -> impl Iterator<Item = (u64, LabelTables)> {
     let none = LabelTables::default;
     let gradients = [(10.0, 0.0), (20.0, 0.3), (60.0, 1.0)];
     let many: Vec<(f64, f64)> = (0..45).map(|at| (f64::from(at) * 5.5, f64::from(at % 4) / 8.0)).collect();
@@ -204,7 +204,7 @@ fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
         LabelTables { opacity: ramp(&many), gradient_opacity: ramp(&[(0.0, 1.0)]), ..none() },
         LabelTables { visible: false, ..none() },
     ];
-    labels.iter().copied().zip(all)
+    labels.iter().map(|&label| u64::from(label)).zip(all)
 }
 
 /// Draws a scene by everything that draws it, with and without culling, and compares with the f64 evaluation.
