@@ -64,7 +64,7 @@ pub(super) struct TileRays {
 }
 
 /// The slack in slabs for rays that enter where two slabs meet, which is in the farther one.
-const HAIR_OF_FACE: f64 = 1e-9;
+const FACE_SLACK: f64 = 1e-9;
 
 impl RayMode {
     pub(super) fn new(scene: &Scene, view: &ViewGeometry, grid: &Grid, surfaces: Option<Surfaces>) -> Self {
@@ -95,7 +95,7 @@ impl RayMode {
     fn face(&self, ray: &PixelRay) -> Option<i32> {
         let (cuts, others) = self.kept.as_deref().unwrap_or_default().split_at(self.unshaded);
         let start = ray.inside(cuts).start;
-        (start > ray.inside(others).start).then(|| (ray.slab(start) + HAIR_OF_FACE).floor() as i32)
+        (start > ray.inside(others).start).then(|| (ray.slab(start) + FACE_SLACK).floor() as i32)
     }
 
     /// The range of depths at which a pixel's ray shows something.

@@ -40,14 +40,14 @@ pub(crate) struct CutCells {
 }
 
 /// The slack of distances from planes in extents of cells, for those that meet a cell's very end.
-const HAIR_OF_FACE: f64 = 1e-9;
+const FACE_SLACK: f64 = 1e-9;
 
 impl CutCells {
     /// Whether one is a voxel's.
     pub(crate) fn contain(&self, voxel: DVec3) -> bool {
         let distance = |row: &DVec4| row.dot(voxel.extend(1.0));
-        let meets = |row: &DVec4| distance(row).abs() <= 0.5 + HAIR_OF_FACE;
-        let touches_box = || self.crop.iter().all(|row| distance(row) >= -0.5 - HAIR_OF_FACE);
+        let meets = |row: &DVec4| distance(row).abs() <= 0.5 + FACE_SLACK;
+        let touches_box = || self.crop.iter().all(|row| distance(row) >= -0.5 - FACE_SLACK);
         self.planes.iter().any(meets) || (self.crop.iter().any(meets) && touches_box())
     }
 }

@@ -29,7 +29,7 @@ pub struct Pixel<'a> {
 }
 
 /// The slack in sheets for rays that enter where two slabs meet, which is in the farther one.
-const HAIR_OF_FACE: f64 = 1e-9;
+const FACE_SLACK: f64 = 1e-9;
 
 /// The field at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -107,7 +107,7 @@ impl<'a> Pixel<'a> {
         let depth_per_sheet = ray.depth(geometry, 1.0) - ray.depth(geometry, 0.0);
         let cut = ray.inside(&geometry.clip).start;
         let is_face = !frame.scene.clip.shade_faces && cut > cells.start.max(near);
-        let face = is_face.then(|| (ray.sheet(geometry, cut) + HAIR_OF_FACE).floor() as i32);
+        let face = is_face.then(|| (ray.sheet(geometry, cut) + FACE_SLACK).floor() as i32);
         Self { frame, length_per_sheet: ray.along.length() * depth_per_sheet, ray, stretch, face }
     }
 
