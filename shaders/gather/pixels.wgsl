@@ -25,6 +25,8 @@ var<private> shown_from: vec4f;
 var<private> shown_to: vec4f;
 var<private> hits: vec4u;
 
+const PIXELS = vec4u(0u, 1u, 2u, 3u);
+
 // A mask of the halves of blocks, four threads each, in which a subgroup has the threads of a round.
 fn halves_of(thread: u32) -> u32 {
     return united(1u << (thread / 4u));

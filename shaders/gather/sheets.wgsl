@@ -59,26 +59,21 @@ var<private> counted_to: vec4f;
 
 // Determines the cuts and weights for the rays of a thread's four pixels, which are in one column.
 fn find_stretches(column: f32, rows: vec4f) {
-    if CUT {
-        let across = array<vec2f, 4>(
-            shown(vec2f(column, rows.x)),
-            shown(vec2f(column, rows.y)),
-            shown(vec2f(column, rows.z)),
-            shown(vec2f(column, rows.w)),
-        );
-        shown_from = vec4f(across[0].x, across[1].x, across[2].x, across[3].x);
-        shown_to = vec4f(across[0].y, across[1].y, across[2].y, across[3].y);
-    }
-    if is_by_means() {
-        let across = array<Means, 4>(
-            means(vec2f(column, rows.x)),
-            means(vec2f(column, rows.y)),
-            means(vec2f(column, rows.z)),
-            means(vec2f(column, rows.w)),
-        );
-        weights = vec4f(across[0].weight, across[1].weight, across[2].weight, across[3].weight);
-        counted_from = vec4f(across[0].counted.x, across[1].counted.x, across[2].counted.x, across[3].counted.x);
-        counted_to = vec4f(across[0].counted.y, across[1].counted.y, across[2].counted.y, across[3].counted.y);
+    // Begun at an unknown 0, loops stay loops: written out for four pixels they are half of what a driver has to compile.
+    for (var i = zero; (CUT || is_by_means()) && i < 4u; i += 1u) {
+        let here = PIXELS == vec4u(i);
+        let point_px = vec2f(column, rows[i]);
+        if CUT {
+            let across = shown(point_px);
+            shown_from = select(shown_from, vec4f(across.x), here);
+            shown_to = select(shown_to, vec4f(across.y), here);
+        }
+        if is_by_means() {
+            let across = means(point_px);
+            weights = select(weights, vec4f(across.weight), here);
+            counted_from = select(counted_from, vec4f(across.counted.x), here);
+            counted_to = select(counted_to, vec4f(across.counted.y), here);
+        }
     }
 }
 
@@ -151,18 +146,15 @@ fn composite_sheet(image: mat4x4f, sheet: mat4x4f, near: f32) -> mat4x4f {
 
 // Composites a group's sheets over or under the image; the first begins at the sheet depth `near`.
 fn composite_group(image: mat4x4f, sheets: Sheets, near: f32) -> mat4x4f {
-    let width = frame.slab_width;
     var result = image;
-    if ORDER == FRONT_TO_BACK {
-        result = composite_sheet(result, sheets.first, near);
-        result = composite_sheet(result, sheets.second, near + width);
-        result = composite_sheet(result, sheets.third, near + 2.0 * width);
-        result = composite_sheet(result, sheets.fourth, near + 3.0 * width);
-    } else {
-        result = composite_sheet(result, sheets.fourth, near + 3.0 * width);
-        result = composite_sheet(result, sheets.third, near + 2.0 * width);
-        result = composite_sheet(result, sheets.second, near + width);
-        result = composite_sheet(result, sheets.first, near);
+    for (var i = zero; i < SHEETS; i += 1u) {
+        let at = select(SHEETS - 1u - i, i, ORDER == FRONT_TO_BACK);
+        result = composite_sheet(result, sheet_at(sheets, at), near + f32(at) * frame.slab_width);
     }
     return result;
+}
+
+fn sheet_at(sheets: Sheets, at: u32) -> mat4x4f {
+    let is_odd = vec4<bool>((at & 1u) != 0u);
+    return chosen(chosen(sheets.first, sheets.second, is_odd), chosen(sheets.third, sheets.fourth, is_odd), vec4<bool>(at >= 2u));
 }

@@ -38,15 +38,14 @@ fn place_of(point_px: vec2f) -> vec3f {
 fn shown_depths(point_px: vec2f) -> vec2f {
     let at = place_of(point_px);
     var depths = vec2f(-FAR, FAR);
-    // Neither a loop's end nor an `if` may depend on a uniform, for the reason given at `start`; and `&&` is an `if`.
-    for (var i = 0u; i < MOST_PLANES; i += 1u) {
+    // Neither a loop's end nor an `if` may depend on uniforms alone, for the reason given at `start`; and `&&` is an `if`.
+    for (var i = zero; i < cut.plane_count + zero; i += 1u) {
         let distance = dot(cut.planes[2u * i].xyz, at);
         let slope = dot(cut.planes[2u * i + 1u].xyz, at);
         let crossing = -distance / slope;
-        let is_plane = i < cut.plane_count;
-        depths.x = select(depths.x, max(depths.x, crossing), is_plane & (slope > 0.0));
-        depths.y = select(depths.y, min(depths.y, crossing), is_plane & (slope < 0.0));
-        depths.y = select(depths.y, -FAR, is_plane & (slope == 0.0) & (distance < 0.0));
+        depths.x = select(depths.x, max(depths.x, crossing), slope > 0.0);
+        depths.y = select(depths.y, min(depths.y, crossing), slope < 0.0);
+        depths.y = select(depths.y, -FAR, (slope == 0.0) & (distance < 0.0));
     }
     let z = textureLoad(surfaces, vec2u(point_px) + cut.surface_origin, 0);
     let ndc = vec4f(at.xy, z, 1.0);
