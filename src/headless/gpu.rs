@@ -294,6 +294,8 @@ impl GpuHeadless {
             frame_ms,
             light_ms: None,
             light_bytes: None,
+            light_level: None,
+            light_stride: None,
         }))
     }
 }

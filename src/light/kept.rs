@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use web_time::Instant;
 
-use super::lights::Lights;
+use super::lights::{Light, Lights};
 use super::matter::LightMatter;
 #[cfg(feature = "gpu")]
 use super::matter::lit_bricks;
@@ -31,6 +31,8 @@ pub struct KeptLight {
     sheets: [Option<(Source, Arc<LightSheets>)>; 2],
     /// Milliseconds that the last call took.
     milliseconds: f64,
+    /// Lights that are made elsewhere.
+    given: Option<Arc<Lights>>,
 }
 
 /// Matter, and what it depends on.
@@ -55,6 +57,11 @@ struct Source {
 }
 
 impl KeptLight {
+    /// Light that is made elsewhere, of more than the voxels of a view: of all channels, or of the whole volume of a box.
+    pub fn given(lights: Arc<Lights>) -> Self {
+        Self { given: Some(lights), ..Self::default() }
+    }
+
     /// The light sheets of a scene with a camera that is framed, always of the same volume; `None` without occlusion, shadow or shading. What has not
     /// changed since the last call is not made again.
     ///
@@ -68,8 +75,11 @@ impl KeptLight {
     ) -> Result<Option<Arc<Lights>>, RenderError> {
         let start = Instant::now();
         if scene.shading.light_key().is_none() {
-            *self = Self::default();
+            *self = Self { given: self.given.take(), ..Self::default() };
             return Ok(None);
+        }
+        if let Some(given) = &self.given {
+            return Ok(Some(Arc::new(given.on(volume.grid()))));
         }
         let is_same = |kept: &KeptMatter| kept.transfer == *transfer && kept.clip == scene.clip;
         let matter = match self.matter.take().filter(is_same) {
@@ -112,7 +122,9 @@ impl KeptLight {
             }
         }
         let of = |number: usize, amount: f64| {
-            self.sheets[number].as_ref().map(|(_, sheets)| (amount as f32, Arc::clone(sheets)))
+            let (_, sheets) = self.sheets[number].as_ref()?;
+            let rows = sheets.rows(volume.grid());
+            Some(Light { amount: amount as f32, sheets: Arc::clone(sheets), rows })
         };
         let lights = Lights { occlusion: of(0, occlusion), shadow: of(1, shadow) };
         self.milliseconds = start.elapsed().as_secs_f64() * 1e3;

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, DVec4};
 
 use super::sheets::LightSheets;
+use crate::volume::Grid;
 
 /// The shares that are left of ambient and of other light: A and S.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -15,21 +16,44 @@ pub struct Left {
     pub direct: f32,
 }
 
+/// A stack of light sheets among the voxels that are drawn.
+#[derive(Clone, Debug)]
+pub struct Light {
+    /// The amount of occlusion or of shadow.
+    pub amount: f32,
+    /// The stack.
+    pub sheets: Arc<LightSheets>,
+    /// Rows whose products with voxel coordinates (i, j, k, 1) are a point's place in the stack ([`LightSheets::rows`]).
+    pub rows: [DVec4; 3],
+}
+
+impl Light {
+    /// The share of the light that is left at a point in voxel coordinates.
+    fn left(&self, voxel: DVec3) -> f32 {
+        let place = self.rows.map(|row| row.dot(voxel.extend(1.0)) as f32);
+        1.0 - self.amount * (1.0 - self.sheets.at_place(place))
+    }
+}
+
 /// The light sheets of a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
-    /// The amount of occlusion, and its sheets.
-    pub occlusion: Option<(f32, Arc<LightSheets>)>,
-    /// The amount of shadow, and its sheets.
-    pub shadow: Option<(f32, Arc<LightSheets>)>,
+    /// The sheets of occlusion.
+    pub occlusion: Option<Light>,
+    /// The sheets of shadow.
+    pub shadow: Option<Light>,
 }
 
 impl Lights {
     /// The light that is left at a point in voxel coordinates.
     pub fn left(&self, voxel: DVec3) -> Left {
-        let left = |light: &Option<(f32, Arc<LightSheets>)>| {
-            light.as_ref().map_or(1.0, |(amount, sheets)| 1.0 - amount * (1.0 - sheets.at(voxel)))
-        };
+        let left = |light: &Option<Light>| light.as_ref().map_or(1.0, |light| light.left(voxel));
         Left { ambient: left(&self.occlusion), direct: left(&self.shadow) }
+    }
+
+    /// The same light for the voxels of another grid of the volume: of another level, or of a box.
+    pub fn on(&self, grid: &Grid) -> Self {
+        let on = |light: &Light| Light { rows: light.sheets.rows(grid), ..light.clone() };
+        Self { occlusion: self.occlusion.as_ref().map(on), shadow: self.shadow.as_ref().map(on) }
     }
 }

@@ -21,10 +21,12 @@ mod matter;
 mod profile;
 mod sheets;
 mod splat;
+mod streamed;
 mod view;
 mod window;
 
 pub use kept::KeptLight;
-pub use lights::{Left, Lights};
+pub use lights::{Left, Light, Lights};
 pub use matter::LightMatter;
 pub use sheets::LightSheets;
+pub use streamed::StreamedLight;

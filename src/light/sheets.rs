@@ -10,11 +10,18 @@ use super::view::LightView;
 use crate::kernel::Kernel;
 use crate::lists::quad_plan::Overlaps;
 use crate::parallel::prelude::*;
+use crate::volume::Grid;
+
+/// Where a grid's voxel (0, 0, 0) lies, in `unit`s from the world's origin.
+fn first_voxel(grid: &Grid) -> DVec3 {
+    grid.place() / grid.unit() - grid.center() * grid.aspect()
+}
 
 /// The light that each plane gets from one direction.
 #[derive(Clone, Debug)]
 pub struct LightSheets {
-    rows: [DVec4; 3],
+    /// Rows whose products with positions (x, y, z, 1), in `unit`s from the world's origin, are places as [`Self::rows`] tells.
+    place: [DVec4; 3],
     /// The pixels along each side of a plane.
     pub side: usize,
     /// The number of the first plane, before the first slab that any kernel touches.
@@ -44,8 +51,13 @@ impl LightSheets {
         let slabs = Overlaps::count(&matter.bricks, &light.view).slabs;
         let ([x, y, plane], side) = (light.place, light.side);
         let rows = [x, y, plane - DVec4::W * f64::from(slabs.start)];
+        let (aspect, first) = (matter.grid.aspect(), first_voxel(&matter.grid));
+        let place = rows.map(|row| {
+            let of_position = row.truncate() / aspect;
+            of_position.extend(row.w - of_position.dot(first))
+        });
         if slabs.is_empty() {
-            return variances.map(|_| Self { rows, side, first: 0, planes: 0, light: Vec::new() });
+            return variances.map(|_| Self { place, side, first: 0, planes: 0, light: Vec::new() });
         }
         let (pixels, count) = (side * side, slabs.len());
         let mut number = 0;
@@ -71,7 +83,7 @@ impl LightSheets {
                 filter.spread(side, *area, (&before[k * pixels..], &passed), &mut along_x, &mut after[..pixels]);
             }
         }
-        stacks.map(|stack| Self { rows, side, first: slabs.start, planes: count + 1, light: stack.light })
+        stacks.map(|stack| Self { place, side, first: slabs.start, planes: count + 1, light: stack.light })
     }
 
     /// The number of planes; 0 if no voxel takes part.
@@ -79,15 +91,11 @@ impl LightSheets {
         self.planes
     }
 
-    /// Rows whose products with voxel coordinates (i, j, k, 1) are where a point is looked up: in pixels right of the first one's centre and below it, and in
-    /// planes from the first one on.
-    pub fn rows(&self) -> [DVec4; 3] {
-        self.rows
-    }
-
-    /// T at a point in voxel coordinates.
-    pub fn at(&self, voxel: DVec3) -> f32 {
-        self.at_place(self.rows().map(|row| row.dot(voxel.extend(1.0)) as f32))
+    /// Rows whose products with voxel coordinates (i, j, k, 1) of a grid of the volume, of any level or box, are where a point is looked up: in pixels right of
+    /// the first one's centre and below it, and in planes from the first one on.
+    pub fn rows(&self, grid: &Grid) -> [DVec4; 3] {
+        let (aspect, first) = (grid.aspect(), first_voxel(grid));
+        self.place.map(|row| (row.truncate() * aspect).extend(row.w + row.truncate().dot(first)))
     }
 
     /// T at a place as [`Self::rows`] gives it: bilinear between pixel centres, 1 beyond the image, linear between planes, and that of the first and the last

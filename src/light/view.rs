@@ -34,8 +34,7 @@ impl LightView {
     /// If a stack would take more than 4 GiB.
     pub(super) fn new(grid: &Grid, scene: &Scene, up: DVec3, to_light: DVec3) -> Result<Self, RenderError> {
         let (step, radius) = (scene.shading.light_step, scene.splatting.radius);
-        let half = (grid.bounding_radius(radius) / grid.unit() / step).ceil();
-        let side = 2.0 * half + 1.0;
+        let side = side(grid.bounding_radius(radius) / grid.unit(), step);
         let bytes = side * side * side * size_of::<f32>() as f64;
         if bytes > MOST_BYTES {
             let found = format!("{step}, so {:.1} GB of light sheets", bytes / 1e9);
@@ -56,9 +55,15 @@ impl LightView {
         let bias = radius * (aspect * to_light).length() * to_light / aspect;
         let moved = |row: DVec4| row + DVec4::W * row.truncate().dot(bias);
         let [x, y, depth, _] = view.screen_from_voxel;
+        let half = (side - 1.0) / 2.0;
         let place = [moved(x) + DVec4::W * half, moved(y) + DVec4::W * half, moved(depth) / view.slabs.width];
         Ok(Self { view, side: side as usize, place })
     }
+}
+
+/// The pixels along each side of sheets with some step, for a scene whose sphere has some radius, both in `unit`s.
+pub(super) fn side(radius: f64, step: f64) -> f64 {
+    2.0 * (radius / step).ceil() + 1.0
 }
 
 /// The camera's `up`, of length 1, or, where it is nearly along the light, the world axis least along that.
