@@ -9,7 +9,7 @@ use wgpu::{
 
 use super::layout::Frame;
 use crate::error::RenderError;
-use crate::light::{Light, LightSheets, Lights};
+use crate::light::{LightSheets, LightStack, Lights};
 
 /// The texels that are written at a time.
 const WRITTEN: usize = 1 << 24;
@@ -30,7 +30,7 @@ pub struct LightTexture {
 }
 
 /// The stacks of some lights.
-fn stacks(lights: &Lights) -> [Option<&Light>; 2] {
+fn stacks(lights: &Lights) -> [Option<&LightStack>; 2] {
     [&lights.occlusion, &lights.shadow].map(Option::as_ref)
 }
 
@@ -121,7 +121,9 @@ pub fn note(frame: &mut Frame, lights: &Lights) {
     let mut first = 0;
     for (number, stack) in stacks(lights).into_iter().enumerate() {
         // Without a voxel that takes part there is all light.
-        let Some(Light { amount, sheets, rows }) = stack.filter(|light| light.sheets.planes() > 0) else { continue };
+        let Some(LightStack { amount, sheets, rows }) = stack.filter(|light| light.sheets.planes() > 0) else {
+            continue;
+        };
         let rows = rows.map(|row| row.as_vec4().to_array());
         frame.light_place[3 * number..3 * number + 3].copy_from_slice(&rows);
         frame.light_stacks[number] = [*amount, first as f32, (sheets.planes() - 1) as f32, 0.0];

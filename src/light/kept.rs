@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use web_time::Instant;
 
-use super::lights::{Light, Lights};
+use super::lights::{LightStack, Lights};
 use super::matter::LightMatter;
 #[cfg(feature = "gpu")]
 use super::matter::lit_bricks;
@@ -124,7 +124,7 @@ impl KeptLight {
         let of = |number: usize, amount: f64| {
             let (_, sheets) = self.sheets[number].as_ref()?;
             let rows = sheets.rows(volume.grid());
-            Some(Light { amount: amount as f32, sheets: Arc::clone(sheets), rows })
+            Some(LightStack { amount: amount as f32, sheets: Arc::clone(sheets), rows })
         };
         let lights = Lights { occlusion: of(0, occlusion), shadow: of(1, shadow) };
         self.milliseconds = start.elapsed().as_secs_f64() * 1e3;

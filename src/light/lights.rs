@@ -18,7 +18,7 @@ pub struct Left {
 
 /// A stack of light sheets among the voxels that are drawn.
 #[derive(Clone, Debug)]
-pub struct Light {
+pub struct LightStack {
     /// The amount of occlusion or of shadow.
     pub amount: f32,
     /// The stack.
@@ -27,11 +27,10 @@ pub struct Light {
     pub rows: [DVec4; 3],
 }
 
-impl Light {
-    /// The share of the light that is left at a point in voxel coordinates.
-    fn left(&self, voxel: DVec3) -> f32 {
-        let place = self.rows.map(|row| row.dot(voxel.extend(1.0)) as f32);
-        1.0 - self.amount * (1.0 - self.sheets.at_place(place))
+impl LightStack {
+    /// T at a point in voxel coordinates.
+    pub fn at(&self, voxel: DVec3) -> f32 {
+        self.sheets.at_place(self.rows.map(|row| row.dot(voxel.extend(1.0)) as f32))
     }
 }
 
@@ -39,21 +38,23 @@ impl Light {
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
     /// The sheets of occlusion.
-    pub occlusion: Option<Light>,
+    pub occlusion: Option<LightStack>,
     /// The sheets of shadow.
-    pub shadow: Option<Light>,
+    pub shadow: Option<LightStack>,
 }
 
 impl Lights {
     /// The light that is left at a point in voxel coordinates.
     pub fn left(&self, voxel: DVec3) -> Left {
-        let left = |light: &Option<Light>| light.as_ref().map_or(1.0, |light| light.left(voxel));
+        let left = |light: &Option<LightStack>| {
+            light.as_ref().map_or(1.0, |light| 1.0 - light.amount * (1.0 - light.at(voxel)))
+        };
         Left { ambient: left(&self.occlusion), direct: left(&self.shadow) }
     }
 
     /// The same light for the voxels of another grid of the volume: of another level, or of a box.
     pub fn on(&self, grid: &Grid) -> Self {
-        let on = |light: &Light| Light { rows: light.sheets.rows(grid), ..light.clone() };
+        let on = |light: &LightStack| LightStack { rows: light.sheets.rows(grid), ..light.clone() };
         Self { occlusion: self.occlusion.as_ref().map(on), shadow: self.shadow.as_ref().map(on) }
     }
 }

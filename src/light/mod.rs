@@ -26,7 +26,7 @@ mod view;
 mod window;
 
 pub use kept::KeptLight;
-pub use lights::{Left, Light, Lights};
+pub use lights::{Left, LightStack, Lights};
 pub use matter::LightMatter;
 pub use sheets::LightSheets;
 pub use streamed::StreamedLight;

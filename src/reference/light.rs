@@ -24,9 +24,9 @@ use crate::volume::{Grid, Volume};
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
     /// The amount of occlusion, and its sheets.
-    occlusion: Option<(f64, LightSheets)>,
+    occlusion: Option<(f64, Arc<LightSheets>)>,
     /// The amount of shadow, and its sheets.
-    shadow: Option<(f64, LightSheets)>,
+    shadow: Option<(f64, Arc<LightSheets>)>,
     /// Where the grid's centre lies whose voxels light is made of, in `unit`s.
     place: DVec3,
     /// From that centre to that of the grid whose points are lit.
@@ -65,7 +65,7 @@ impl Lights {
         };
         let sheets = |amount: f64, to_light: DVec3, spread: f64| {
             let sheets = || LightSheets::new((volume, transfer), scene, to_light, spread);
-            (amount > 0.0).then(|| sheets().map(|sheets| (amount, sheets))).transpose()
+            (amount > 0.0).then(|| sheets().map(|sheets| (amount, Arc::new(sheets)))).transpose()
         };
         Ok(Self {
             occlusion: sheets(shading.occlusion, -basis.w, shading.occlusion_spread)?,
@@ -93,7 +93,7 @@ impl Lights {
     /// The light that is left at a point, in `unit`s from the grid's centre.
     pub fn left(&self, p: DVec3) -> Left {
         let p = p + self.offset;
-        let left = |light: &Option<(f64, LightSheets)>| {
+        let left = |light: &Option<(f64, Arc<LightSheets>)>| {
             light.as_ref().map_or(1.0, |(amount, sheets)| 1.0 - amount * (1.0 - sheets.at(p)))
         };
         Left { ambient: left(&self.occlusion), direct: left(&self.shadow) }

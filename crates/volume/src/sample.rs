@@ -127,7 +127,8 @@ fn pieces(
     // Chunks to a side of the boxes of which one is read.
     let groups = |side: u32| across.map(|count| count.div_ceil(side));
     let is_few = |side: &u32| groups(*side).as_u64vec3().element_product() <= MOST_CHUNKS;
-    let side = if step == 1 || chunks == Chunks::All { 1 } else { (1..=across.max_element()).find(is_few).unwrap_or(1) };
+    let side =
+        if step == 1 || chunks == Chunks::All { 1 } else { (1..=across.max_element()).find(is_few).unwrap_or(1) };
     let groups = groups(side);
     let of_group = |at: u32| {
         let at = UVec3::new(at % groups.x, at / groups.x % groups.y, at / (groups.x * groups.y)) * side;

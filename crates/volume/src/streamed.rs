@@ -315,7 +315,8 @@ pub fn sample_of_channels(
 ) -> Result<Volume, VolumeError> {
     check_grids((first, further))?;
     let common = common_levels((first, further));
-    let parts: u64 = channels_of((first, further)).flat_map(StreamedChannel::levels).map(|of| parts_of(&*of.store)).sum();
+    let parts: u64 =
+        channels_of((first, further)).flat_map(StreamedChannel::levels).map(|of| parts_of(&*of.store)).sum();
     let grids: Vec<Grid> = common.iter().map(|&(_, grid)| grid).collect();
     let (number, step) = spread(&grids, memory / parts);
     read_every((first, further), (&common[number].1, step), Chunks::Few)
