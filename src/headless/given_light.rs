@@ -25,6 +25,10 @@ pub(super) struct GivenLight {
 
 #[derive(Clone, Debug)]
 enum Form {
+    #[cfg_attr(
+        not(any(feature = "cpu", feature = "gpu")),
+        expect(dead_code, reason = "the f64 evaluation has another form")
+    )]
     Sheets(Arc<Lights>),
     /// For the f64 evaluation.
     Exact(Arc<reference::Lights>),
@@ -92,6 +96,7 @@ impl GivenLight {
     }
 
     /// The light as a native backend or a GPU keeps it.
+    #[cfg(any(feature = "cpu", feature = "gpu"))]
     pub(super) fn kept(given: Option<&Self>) -> KeptLight {
         match given.map(|given| &given.form) {
             Some(Form::Sheets(lights)) => KeptLight::given(Arc::clone(lights)),

@@ -13,6 +13,7 @@
 //! Everything is `f32` by IEEE `+ - × ÷ √` alone and each sum is taken in one order, so that stacks have the same bytes on every machine with any number of
 //! threads (SPEC §12).
 
+mod band;
 mod box_filter;
 mod kept;
 mod lights;

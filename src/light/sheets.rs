@@ -2,8 +2,8 @@
 
 use glam::{DVec3, DVec4};
 
+use super::band::{Band, ROWS};
 use super::box_filter::{Area, BoxFilter};
-use super::lit::Lit;
 use super::matter::LightMatter;
 use super::splat::Splatter;
 use super::view::LightView;
@@ -69,18 +69,34 @@ impl LightSheets {
             Growing { filter: BoxFilter::new(variance), area: Area::NONE, light }
         });
         let splatter = Splatter::new(matter, light, kernel, slabs.start);
-        let (mut passed, mut along_x) = (vec![1.0; pixels], vec![0.0; pixels]);
-        for k in 0..count {
+        let mut bands = Band::<N>::all(&splatter);
+        for (k, begun) in splatter.begun(count).into_iter().enumerate() {
+            for Growing { filter, area, .. } in &mut stacks {
+                *area = area.and(begun).grown(filter.reach(), side);
+            }
             let planes = stacks.each_ref().map(|stack| &stack.light[k * pixels..(k + 1) * pixels]);
-            let lit = Lit::of(&planes, side);
-            let touched = splatter.slab(k, &lit, &mut passed);
-            for Growing { filter, area, light } in &mut stacks {
-                *area = area.and(touched).grown(filter.reach(), side);
+            bands.par_iter_mut().for_each(|band| {
+                band.draw(&splatter, k, &planes);
+                for ((Growing { filter, area, .. }, plane), number) in stacks.iter().zip(planes).zip(0..) {
+                    band.spread(number, (filter, area), plane);
+                }
+            });
+            let bands = &bands;
+            for (number, Growing { filter, area, light }) in stacks.iter_mut().enumerate() {
+                let (rows, columns) = (area.low[1]..area.end[1], area.low[0]..area.end[0]);
                 if area.is_empty() {
                     continue;
                 }
-                let (before, after) = light.split_at_mut((k + 1) * pixels);
-                filter.spread(side, *area, (&before[k * pixels..], &passed), &mut along_x, &mut after[..pixels]);
+                let plane = &mut light[(k + 1) * pixels..][..pixels];
+                plane.par_chunks_mut(side).enumerate().with_min_len(ROWS).for_each(|(y, to)| {
+                    let row = |offset: isize| {
+                        let y = y.checked_add_signed(offset).filter(|y| *y < side)?;
+                        Some(&bands[y / ROWS].along[number][y % ROWS * side..][..side])
+                    };
+                    if rows.contains(&y) {
+                        filter.down(columns.clone(), row, to);
+                    }
+                });
             }
         }
         stacks.map(|stack| Self { place, side, first: slabs.start, planes: count + 1, light: stack.light })
