@@ -8,9 +8,10 @@ use super::profile::passed;
 use super::splat::{Shape, Splatter};
 use super::window::Window;
 use crate::lists::brick;
+use crate::parallel::current_num_threads;
 
-/// The rows of a band.
-pub(super) const ROWS: usize = 16;
+/// The minimum and the maximum number of rows of a band. Voxels at a border are drawn in both bands, but a thread needs some bands to share.
+const ROWS: [usize; 2] = [12, 32];
 
 /// Some rows of N stacks' sheets while these are made.
 #[derive(Debug)]
@@ -44,12 +45,13 @@ struct Begun {
 }
 
 impl<const N: usize> Band<N> {
-    /// All bands of a view, with their bricks.
-    pub(super) fn all(splatter: &Splatter<'_>) -> Vec<Self> {
+    /// All bands of a view, with their bricks; and the number of rows of all but the last. Sums do not depend on it.
+    pub(super) fn all(splatter: &Splatter<'_>) -> (Vec<Self>, usize) {
         let side = splatter.side;
+        let height = side.div_ceil(3 * current_num_threads()).clamp(ROWS[0], ROWS[1]);
         let margin = splatter.margin();
         let band = |first: usize| {
-            let rows = ROWS.min(side - first);
+            let rows = height.min(side - first);
             Self {
                 first,
                 rows,
@@ -62,15 +64,15 @@ impl<const N: usize> Band<N> {
                 line: Vec::new(),
             }
         };
-        let mut bands: Vec<Self> = (0..side).step_by(ROWS).map(band).collect();
+        let mut bands: Vec<Self> = (0..side).step_by(height).map(band).collect();
         for &number in splatter.order.iter().rev() {
             let area = &splatter.placed[number as usize].area;
             if !area.is_empty() {
-                let bands = &mut bands[area.low[1] / ROWS..area.end[1].div_ceil(ROWS)];
+                let bands = &mut bands[area.low[1] / height..area.end[1].div_ceil(height)];
                 bands.iter_mut().for_each(|band| band.waiting.push(number));
             }
         }
-        bands
+        (bands, height)
     }
 
     /// Finds the light that passes a slab, counted from the first one. Slabs come one after the other. Voxels are left out behind whose pixels the planes before

@@ -13,8 +13,6 @@ use super::sheets::LightSheets;
 use super::view::LightView;
 use crate::error::RenderError;
 use crate::kernel::Kernel;
-#[cfg(feature = "gpu")]
-use crate::lists::quad_plan::Overlaps;
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
@@ -150,7 +148,7 @@ impl KeptLight {
         let [mut side, mut planes] = [0; 2];
         for source in wanted.iter().flatten() {
             let light = LightView::new(volume.grid(), scene, camera.up, source.to_light)?;
-            let slabs = Overlaps::count(bricks.bricks(), &light.view).slabs.len() as u32;
+            let slabs = light.slabs(bricks.bricks()).len() as u32;
             (side, planes) = (light.side as u32, planes + if slabs > 0 { slabs + 1 } else { 0 });
         }
         Ok([side, planes])

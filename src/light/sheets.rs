@@ -2,13 +2,12 @@
 
 use glam::{DVec3, DVec4};
 
-use super::band::{Band, ROWS};
+use super::band::Band;
 use super::box_filter::{Area, BoxFilter};
 use super::matter::LightMatter;
 use super::splat::Splatter;
 use super::view::LightView;
 use crate::kernel::Kernel;
-use crate::lists::quad_plan::Overlaps;
 use crate::parallel::prelude::*;
 use crate::volume::Grid;
 
@@ -48,7 +47,7 @@ impl LightSheets {
         variances: [f64; N],
         mut memory: [Vec<f32>; N],
     ) -> [Self; N] {
-        let slabs = Overlaps::count(&matter.bricks, &light.view).slabs;
+        let slabs = light.slabs(&matter.bricks);
         let ([x, y, plane], side) = (light.place, light.side);
         let rows = [x, y, plane - DVec4::W * f64::from(slabs.start)];
         let (aspect, first) = (matter.grid.aspect(), first_voxel(&matter.grid));
@@ -69,7 +68,7 @@ impl LightSheets {
             Growing { filter: BoxFilter::new(variance), area: Area::NONE, light }
         });
         let splatter = Splatter::new(matter, light, kernel, slabs.start);
-        let mut bands = Band::<N>::all(&splatter);
+        let (mut bands, height) = Band::<N>::all(&splatter);
         for (k, begun) in splatter.begun(count).into_iter().enumerate() {
             for Growing { filter, area, .. } in &mut stacks {
                 *area = area.and(begun).grown(filter.reach(), side);
@@ -88,10 +87,10 @@ impl LightSheets {
                     continue;
                 }
                 let plane = &mut light[(k + 1) * pixels..][..pixels];
-                plane.par_chunks_mut(side).enumerate().with_min_len(ROWS).for_each(|(y, to)| {
+                plane.par_chunks_mut(side).enumerate().with_min_len(height).for_each(|(y, to)| {
                     let row = |offset: isize| {
                         let y = y.checked_add_signed(offset).filter(|y| *y < side)?;
-                        Some(&bands[y / ROWS].along[number][y % ROWS * side..][..side])
+                        Some(&bands[y / height].along[number][y % height * side..][..side])
                     };
                     if rows.contains(&y) {
                         filter.down(columns.clone(), row, to);
