@@ -48,6 +48,12 @@ pub struct Stats {
     /// Bytes of memory that they take.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub light_bytes: Option<u64>,
+    /// The level that light is made of where the volume is streamed, and of which voxel of it along each axis every how manieth; only where there is any light.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light_level: Option<u64>,
+    /// See [`Self::light_level`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light_stride: Option<u64>,
     /// Milliseconds to load or make the volume.
     pub load_ms: f64,
     /// Milliseconds to classify, bucket and upload.

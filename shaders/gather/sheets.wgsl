@@ -1,5 +1,6 @@
 // The sheets that a thread of the tile rasterizer holds, and how they are composited.
 //
+// #import gather/group
 // #import gather/pixels
 // #import gather/state
 // #import shared/compositing

@@ -114,6 +114,11 @@ impl CpuRenderer {
         &self.volume
     }
 
+    /// Draws in light that is made elsewhere.
+    pub(crate) fn set_light(&mut self, light: KeptLight) {
+        self.light = light;
+    }
+
     /// The settings.
     pub fn scene(&self) -> &Scene {
         &self.scene

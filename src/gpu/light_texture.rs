@@ -9,7 +9,7 @@ use wgpu::{
 
 use super::layout::Frame;
 use crate::error::RenderError;
-use crate::light::{LightSheets, Lights};
+use crate::light::{LightSheets, LightStack, Lights};
 
 /// The texels that are written at a time.
 const WRITTEN: usize = 1 << 24;
@@ -29,9 +29,9 @@ pub struct LightTexture {
     pub gpu_bytes: u64,
 }
 
-/// The stacks of some lights, with their amounts.
-fn stacks(lights: &Lights) -> [Option<(f32, &Arc<LightSheets>)>; 2] {
-    [&lights.occlusion, &lights.shadow].map(|stack| stack.as_ref().map(|(amount, sheets)| (*amount, sheets)))
+/// The stacks of some lights.
+fn stacks(lights: &Lights) -> [Option<&LightStack>; 2] {
+    [&lights.occlusion, &lights.shadow].map(Option::as_ref)
 }
 
 impl LightTexture {
@@ -45,7 +45,7 @@ impl LightTexture {
         lights: &Lights,
         mut previous: Option<Self>,
     ) -> Result<Self, RenderError> {
-        let sheets = stacks(lights).map(|stack| stack.map(|(_, sheets)| sheets));
+        let sheets = stacks(lights).map(|stack| stack.map(|light| &light.sheets));
         let is_same = |previous: &Self| {
             previous.sheets.iter().zip(&sheets).all(|pair| match pair {
                 (Some(old), Some(new)) => old.ptr_eq(&Arc::downgrade(new)),
@@ -121,10 +121,12 @@ pub fn note(frame: &mut Frame, lights: &Lights) {
     let mut first = 0;
     for (number, stack) in stacks(lights).into_iter().enumerate() {
         // Without a voxel that takes part there is all light.
-        let Some((amount, sheets)) = stack.filter(|(_, sheets)| sheets.planes() > 0) else { continue };
-        let rows = sheets.rows().map(|row| row.as_vec4().to_array());
+        let Some(LightStack { amount, sheets, rows }) = stack.filter(|light| light.sheets.planes() > 0) else {
+            continue;
+        };
+        let rows = rows.map(|row| row.as_vec4().to_array());
         frame.light_place[3 * number..3 * number + 3].copy_from_slice(&rows);
-        frame.light_stacks[number] = [amount, first as f32, (sheets.planes() - 1) as f32, 0.0];
+        frame.light_stacks[number] = [*amount, first as f32, (sheets.planes() - 1) as f32, 0.0];
         first += sheets.planes();
     }
 }

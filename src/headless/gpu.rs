@@ -6,6 +6,7 @@ use web_time::Instant;
 use wgpu::{Adapter, Device, Queue, TextureFormat};
 
 use super::device::{self, driver_name};
+use super::given_light::GivenLight;
 use super::readback::{self, wait};
 use super::timed::{load_and_render, milliseconds_since, view_and_draw};
 use super::{Backend, Error, HeadlessOptions, Rendering, content};
@@ -145,21 +146,27 @@ impl GpuHeadless {
         &self,
         volume: Volume,
         scene: &Scene,
-        window: &Window,
-        closed: Option<&[bool]>,
+        (window, closed): (&Window, Option<&[bool]>),
+        light: Option<&GivenLight>,
     ) -> Result<(Content, Stats), RenderError> {
-        self.draw_behind(self.view(volume, scene)?, window, closed)
+        self.draw_behind(self.view(volume, scene)?, (window, closed), light)
     }
 
     fn draw_behind(
         &self,
         mut view: SceneView,
-        window: &Window,
-        closed: Option<&[bool]>,
+        (window, closed): (&Window, Option<&[bool]>),
+        light: Option<&GivenLight>,
     ) -> Result<(Content, Stats), RenderError> {
         let upload = |closed| ClosedPixels::upload(&self.device, &self.queue, &window.region, closed);
         view.hiding = closed.map(upload).map(Hiding::Closed);
-        self.draw_content(&mut view, window)
+        view.light = GivenLight::kept(light);
+        view.light_texture = light.and_then(|light| light.texture().take());
+        let drawn = self.draw_content(&mut view, window);
+        if let Some(light) = light {
+            *light.texture() = view.light_texture.take();
+        }
+        drawn
     }
 
     /// Draws a window of a volume in pages to those pixels, row by row, that are not closed.
@@ -171,10 +178,10 @@ impl GpuHeadless {
         &self,
         volume: &GpuVolume,
         scene: &Scene,
-        window: &Window,
-        closed: Option<&[bool]>,
+        (window, closed): (&Window, Option<&[bool]>),
+        light: Option<&GivenLight>,
     ) -> Result<(Content, Stats), RenderError> {
-        self.draw_behind(SceneView::new(&self.device, volume, scene)?, window, closed)
+        self.draw_behind(SceneView::new(&self.device, volume, scene)?, (window, closed), light)
     }
 
     /// Draws the pixels of a part, without first hits, and returns them with statistics.
@@ -294,6 +301,8 @@ impl GpuHeadless {
             frame_ms,
             light_ms: None,
             light_bytes: None,
+            light_level: None,
+            light_stride: None,
         }))
     }
 }

@@ -4,6 +4,7 @@ use web_time::Instant;
 
 use super::Headless;
 use super::boxed::opaque_values;
+use super::given_light::GivenLight;
 use super::timed::milliseconds_since;
 use super::view::HeadlessView;
 use crate::error::RenderError;
@@ -39,8 +40,6 @@ pub(super) fn draw_part(
     headless: &Headless,
 ) -> Result<(Part, Stats), RenderError> {
     part::check(volume.sample(), scene, window)?;
-    let allowed = "0, or splatting.compositing = \"linear\", \"exponential\" or \"xray\"";
-    scene.shading.refuse_light("for a part of channels whose images are added up", allowed)?;
     let explicit = scene.explicit(volume.sample());
     let ImageSettings { width, height, .. } = explicit.image;
     let view = ViewGeometry::new(volume.grid(), &explicit.camera, &explicit.splatting, [width, height])?;
@@ -71,6 +70,7 @@ fn each_channel(
     let counts = Counts { voxels_total: volume.grid().voxels(), ..Counts::default() };
     let mut all = Stats { width, height, backend, counts, ..Stats::default() };
     let mut store = StoreCounts::default();
+    let light = GivenLight::of_channels((volume, explicit), headless.backend())?;
     for (number, transfer) in explicit.resolve(volume.sample()).channels().enumerate() {
         if opaque_values(transfer).ranges().is_empty() {
             draw(None)?;
@@ -80,6 +80,9 @@ fn each_channel(
         by_itself.image.background = [0.0; 4];
         let begin = Instant::now();
         let mut view = headless.view(volume.of_channel(number), &by_itself)?;
+        if let Some((light, _)) = &light {
+            view.set_light(light);
+        }
         let classify_ms = milliseconds_since(begin);
         let Some(stats) = draw(Some(&mut view))? else { continue };
         let mut counts = all.counts;
@@ -97,5 +100,9 @@ fn each_channel(
             Some(volume.with_sample(store))
         }
     };
-    Ok(Stats { store, frame_ms: milliseconds_since(start), ..all })
+    let all = Stats { store, frame_ms: milliseconds_since(start), ..all };
+    Ok(match light {
+        Some((_, noted)) => noted.noted_in(all),
+        None => all,
+    })
 }

@@ -10,6 +10,7 @@ pub mod device;
 #[cfg(feature = "gpu")]
 mod driver;
 mod error;
+mod given_light;
 #[cfg(feature = "gpu")]
 mod gpu;
 mod joined;
@@ -22,6 +23,7 @@ mod view;
 
 use self::boxed::BoxedView;
 pub use self::error::Error;
+use self::given_light::GivenLight;
 #[cfg(feature = "gpu")]
 pub use self::gpu::GpuHeadless;
 pub use self::options::HeadlessOptions;
@@ -185,7 +187,7 @@ impl Headless {
         Ok(HeadlessView::new(ViewBackend::Boxed(Box::new(view)), None))
     }
 
-    /// Draws a window of a box of voxels of a volume that is streamed. Of pixels that are closed, row by row, no more need be drawn.
+    /// Draws a window of a box of voxels of a volume that is streamed, in the light of the whole volume if there is any. Of pixels that are closed, row by row, no more need be drawn.
     #[cfg_attr(
         not(any(feature = "cpu", feature = "gpu")),
         expect(unused_variables, reason = "the f64 evaluation draws what is hidden, too")
@@ -194,16 +196,22 @@ impl Headless {
         &self,
         volume: Volume,
         scene: &Scene,
-        window: &Window,
-        closed: Option<&[bool]>,
+        (window, closed): (&Window, Option<&[bool]>),
+        light: Option<&GivenLight>,
     ) -> Result<(Content, Stats), RenderError> {
         match &self.drawer {
             #[cfg(feature = "gpu")]
-            Drawer::Gpu(gpu) => gpu.draw_box(volume, scene, window, closed),
+            Drawer::Gpu(gpu) => gpu.draw_box(volume, scene, (window, closed), light),
             #[cfg(feature = "cpu")]
-            Drawer::Cpu => CpuRenderer::new(volume, scene)?.draw_box(window, closed),
+            Drawer::Cpu => {
+                let mut renderer = CpuRenderer::new(volume, scene)?;
+                renderer.set_light(GivenLight::kept(light));
+                renderer.draw_box(window, closed)
+            }
             Drawer::Reference => {
-                let (content, _, stats) = ReferenceView::new(volume, scene)?.draw_content(window)?;
+                let mut view = ReferenceView::new(volume, scene)?;
+                view.set_light(light);
+                let (content, _, stats) = view.draw_content(window)?;
                 Ok((content, stats))
             }
         }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use web_time::Instant;
 
+use super::given_light::GivenLight;
 use super::timed::milliseconds_since;
 use super::{Backend, Rendering};
 use crate::error::RenderError;
@@ -11,7 +12,7 @@ use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::part::{self, Content, Part};
 use crate::pick::{FirstHits, Pick};
-use crate::reference::{self, Host};
+use crate::reference::{self, Host, Lights};
 use crate::scene::{ImageSettings, Scene};
 use crate::settings::camera::Camera;
 use crate::settings::splatting::check_first_hit;
@@ -28,6 +29,8 @@ pub(super) struct ReferenceView {
     transfer: TransferFunction,
     first_hit: Option<f64>,
     hits: Option<FirstHits>,
+    /// Light that is made elsewhere.
+    light: Option<Arc<Lights>>,
 }
 
 impl ReferenceView {
@@ -39,7 +42,7 @@ impl ReferenceView {
         scene.check_volume(&volume)?;
         let scene = scene.settled(&volume);
         let transfer = scene.resolve(&volume);
-        Ok(Self { scene, volume, transfer, first_hit: None, hits: None })
+        Ok(Self { scene, volume, transfer, first_hit: None, hits: None, light: None })
     }
 
     pub(super) fn volume(&self) -> &Arc<Volume> {
@@ -48,6 +51,11 @@ impl ReferenceView {
 
     pub(super) fn scene(&self) -> &Scene {
         &self.scene
+    }
+
+    /// Draws parts in light that is made elsewhere.
+    pub(super) fn set_light(&mut self, light: Option<&GivenLight>) {
+        self.light = light.and_then(GivenLight::exact).map(|lights| Arc::new(lights.on(self.volume.grid())));
     }
 
     /// Changes the scene; then the last frame's first hits are gone.
@@ -87,7 +95,7 @@ impl ReferenceView {
         let ImageSettings { width, height, .. } = scene.image;
         let view = ViewGeometry::new(volume.grid(), &framed.camera, &framed.splatting, [width, height])?;
         let opened = window.opened(&view.slabs_of(volume.grid()));
-        let content = reference::part(volume, transfer, scene, &opened)?;
+        let content = reference::lit_part(volume, transfer, (scene, self.light.as_ref()), &opened)?;
         Ok((content, view, self.stats(start)?))
     }
 

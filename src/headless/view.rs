@@ -2,6 +2,7 @@
 
 use super::Backend;
 use super::boxed::BoxedView;
+use super::given_light::GivenLight;
 use super::reference::ReferenceView;
 #[cfg(feature = "cpu")]
 use crate::cpu::{CpuRenderer, StreamRenderer};
@@ -59,6 +60,20 @@ impl HeadlessView {
 
     pub(super) fn backend_mut(&mut self) -> &mut ViewBackend {
         &mut self.backend
+    }
+
+    /// Draws in light that is made elsewhere.
+    pub(super) fn set_light(&mut self, light: &GivenLight) {
+        match &mut self.backend {
+            #[cfg(feature = "gpu")]
+            ViewBackend::Gpu(view) => view.light = GivenLight::kept(Some(light)),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Cpu(view) => view.set_light(GivenLight::kept(Some(light))),
+            #[cfg(feature = "cpu")]
+            ViewBackend::Stream(view) => view.set_light(GivenLight::kept(Some(light))),
+            ViewBackend::Reference(view) => view.set_light(Some(light)),
+            ViewBackend::Boxed(view) => view.set_light(light.clone()),
+        }
     }
 
     /// The settings.

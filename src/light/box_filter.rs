@@ -1,9 +1,9 @@
 //! The separable box filter B of SPEC §14, by which light spreads from sheet to sheet.
 
-use crate::parallel::prelude::*;
+use std::ops::Range;
 
-/// The rows that a thread filters at a time.
-const ROWS: usize = 16;
+/// The columns that are filtered at a time.
+const LINE: usize = 512;
 
 /// A box filter along one axis.
 #[derive(Clone, Debug)]
@@ -68,50 +68,50 @@ impl BoxFilter {
         self.weights.len() - 1
     }
 
-    /// `B(light·passed)` in an area of planes of `side` pixels along each side, whose other pixels stay. Beyond the image there is all light. `along_x`
-    /// is memory of as many pixels.
-    pub(super) fn spread(
+    /// Filters a row of `light·passed` along itself, from a column to before another. Beyond the image there is all light. `line` is memory.
+    pub(super) fn along(
         &self,
-        side: usize,
-        area: Area,
+        columns: Range<usize>,
         (light, passed): (&[f32], &[f32]),
-        along_x: &mut [f32],
-        spread: &mut [f32],
+        line: &mut Vec<f32>,
+        to: &mut [f32],
     ) {
-        let Area { low: [left, top], end: [right, bottom] } = area;
         let reach = self.reach();
-        // Lit pixels beside the area count, and all beyond the image.
-        let rows = top.saturating_sub(reach)..(bottom + reach).min(side);
-        let strip = &mut along_x[rows.start * side..rows.end * side];
-        strip.par_chunks_mut(ROWS * side).enumerate().for_each(|(number, strip)| {
-            let mut line = vec![1.0; side + 2 * reach];
-            for (to, y) in strip.chunks_exact_mut(side).zip(rows.start + number * ROWS..) {
-                let row = y * side..(y + 1) * side;
-                for ((to, light), passed) in line[reach..].iter_mut().zip(&light[row.clone()]).zip(&passed[row]) {
-                    *to = light * passed;
-                }
-                self.sum(&mut to[left..right], |offset| &line[(left + reach).wrapping_add_signed(offset)..]);
-            }
-        });
-        let lit = vec![1.0; side];
-        let along_x = &*along_x;
-        let strip = &mut spread[top * side..bottom * side];
-        strip.par_chunks_mut(ROWS * side).enumerate().for_each(|(number, strip)| {
-            for (to, y) in strip.chunks_exact_mut(side).zip(top + number * ROWS..) {
-                let row = |offset: isize| match y.checked_add_signed(offset) {
-                    Some(y) if y < side => &along_x[y * side + left..],
-                    _ => &lit[left..],
-                };
-                self.sum(&mut to[left..right], row);
-            }
-        });
+        line.clear();
+        line.resize(reach, 1.0);
+        line.extend(light.iter().zip(passed).map(|(light, passed)| light * passed));
+        line.resize(light.len() + 2 * reach, 1.0);
+        let start = columns.start + reach;
+        self.sum(&mut to[columns], |offset| &line[start.wrapping_add_signed(offset)..]);
+    }
+
+    /// Filters a row along the columns, from a column to before another, given the rows that have been filtered along themselves at offsets from it; `None`
+    /// beyond the image.
+    pub(super) fn down<'a>(&self, columns: Range<usize>, row: impl Fn(isize) -> Option<&'a [f32]>, to: &mut [f32]) {
+        let lit = [1.0; LINE];
+        for start in columns.clone().step_by(LINE) {
+            let part = start..(start + LINE).min(columns.end);
+            self.sum(&mut to[part.clone()], |offset| row(offset).map_or(&lit[..], |row| &row[part.start..]));
+        }
     }
 
     /// The weighted sum of lines at all offsets.
     fn sum<'a>(&self, to: &mut [f32], line: impl Fn(isize) -> &'a [f32]) {
-        to.iter_mut().zip(line(0)).for_each(|(to, &light)| *to = light * self.weights[0]);
-        for (offset, &weight) in (0..).zip(&self.weights).skip(1) {
+        let (&weight, rest) = self.weights.split_last().unwrap_or((&1.0, &[]));
+        let reach = rest.len() as isize;
+        let count = to.len();
+        match reach {
+            0 => to.copy_from_slice(&line(0)[..count]),
+            _ => to.iter_mut().zip(line(0)).for_each(|(to, &light)| *to = light * rest[0]),
+        }
+        // All but the last have one weight.
+        for offset in 1..reach {
             for ((to, before), after) in to.iter_mut().zip(line(-offset)).zip(line(offset)) {
+                *to += (before + after) * rest[0];
+            }
+        }
+        if reach > 0 {
+            for ((to, before), after) in to.iter_mut().zip(line(-reach)).zip(line(reach)) {
                 *to += (before + after) * weight;
             }
         }
@@ -142,8 +142,17 @@ mod tests {
         let [x, y] = [4, 9];
         passed[x + y * SIDE] = 0.0;
         let area = Area { low: [x, y], end: [x + 1, y + 1] }.grown(filter.reach(), SIDE);
-        let (mut along_x, mut spread) = (vec![0.0; SIDE * SIDE], vec![1.0; SIDE * SIDE]);
-        filter.spread(SIDE, area, (&light, &passed), &mut along_x, &mut spread);
+        let mut rows = vec![1.0; SIDE * SIDE];
+        let mut line = Vec::new();
+        for (to, row) in rows.chunks_mut(SIDE).zip(0..) {
+            let row = row * SIDE..(row + 1) * SIDE;
+            filter.along(area.low[0]..area.end[0], (&light[row.clone()], &passed[row]), &mut line, to);
+        }
+        let mut spread = vec![1.0; SIDE * SIDE];
+        for (to, y) in spread.chunks_mut(SIDE).zip(0_usize..).take(area.end[1]).skip(area.low[1]) {
+            let row = |offset| y.checked_add_signed(offset).and_then(|y| rows.chunks(SIDE).nth(y));
+            filter.down(area.low[0]..area.end[0], row, to);
+        }
         let weight = |offset: usize| filter.weights.get(offset).copied().unwrap_or(0.0);
         for (at, &light) in spread.iter().enumerate() {
             let expected = 1.0 - weight((at % SIDE).abs_diff(x)) * weight((at / SIDE).abs_diff(y));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use web_time::Instant;
 
-use super::lights::Lights;
+use super::lights::{LightStack, Lights};
 use super::matter::LightMatter;
 #[cfg(feature = "gpu")]
 use super::matter::lit_bricks;
@@ -13,8 +13,6 @@ use super::sheets::LightSheets;
 use super::view::LightView;
 use crate::error::RenderError;
 use crate::kernel::Kernel;
-#[cfg(feature = "gpu")]
-use crate::lists::quad_plan::Overlaps;
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
@@ -31,6 +29,8 @@ pub struct KeptLight {
     sheets: [Option<(Source, Arc<LightSheets>)>; 2],
     /// Milliseconds that the last call took.
     milliseconds: f64,
+    /// Lights that are made elsewhere.
+    given: Option<Arc<Lights>>,
 }
 
 /// Matter, and what it depends on.
@@ -55,6 +55,11 @@ struct Source {
 }
 
 impl KeptLight {
+    /// Light that is made elsewhere, of more than the voxels of a view: of all channels, or of the whole volume of a box.
+    pub fn given(lights: Arc<Lights>) -> Self {
+        Self { given: Some(lights), ..Self::default() }
+    }
+
     /// The light sheets of a scene with a camera that is framed, always of the same volume; `None` without occlusion, shadow or shading. What has not
     /// changed since the last call is not made again.
     ///
@@ -68,8 +73,11 @@ impl KeptLight {
     ) -> Result<Option<Arc<Lights>>, RenderError> {
         let start = Instant::now();
         if scene.shading.light_key().is_none() {
-            *self = Self::default();
+            *self = Self { given: self.given.take(), ..Self::default() };
             return Ok(None);
+        }
+        if let Some(given) = &self.given {
+            return Ok(Some(Arc::new(given.on(volume.grid()))));
         }
         let is_same = |kept: &KeptMatter| kept.transfer == *transfer && kept.clip == scene.clip;
         let matter = match self.matter.take().filter(is_same) {
@@ -112,7 +120,9 @@ impl KeptLight {
             }
         }
         let of = |number: usize, amount: f64| {
-            self.sheets[number].as_ref().map(|(_, sheets)| (amount as f32, Arc::clone(sheets)))
+            let (_, sheets) = self.sheets[number].as_ref()?;
+            let rows = sheets.rows(volume.grid());
+            Some(LightStack { amount: amount as f32, sheets: Arc::clone(sheets), rows })
         };
         let lights = Lights { occlusion: of(0, occlusion), shadow: of(1, shadow) };
         self.milliseconds = start.elapsed().as_secs_f64() * 1e3;
@@ -138,7 +148,7 @@ impl KeptLight {
         let [mut side, mut planes] = [0; 2];
         for source in wanted.iter().flatten() {
             let light = LightView::new(volume.grid(), scene, camera.up, source.to_light)?;
-            let slabs = Overlaps::count(bricks.bricks(), &light.view).slabs.len() as u32;
+            let slabs = light.slabs(bricks.bricks()).len() as u32;
             (side, planes) = (light.side as u32, planes + if slabs > 0 { slabs + 1 } else { 0 });
         }
         Ok([side, planes])

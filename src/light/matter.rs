@@ -15,6 +15,9 @@ const MAX_ALPHA: f64 = 0.9999;
 /// The values whose amounts a thread remembers.
 const KNOWN: usize = 1 << 9;
 
+/// The slots of a brick.
+pub(super) const SLOTS: usize = brick::BRICK_VOXELS as usize;
+
 /// The bricks that a thread looks at at a time.
 const BRICKS: usize = 1024;
 
@@ -23,9 +26,8 @@ const BRICKS: usize = 1024;
 pub struct LightMatter {
     pub(super) grid: Grid,
     pub(super) bricks: Vec<Brick>,
-    /// Where each brick's amounts begin.
-    starts: Vec<u32>,
-    amounts: Vec<f32>,
+    /// By brick and slot; 0 where no voxel takes part.
+    amounts: Vec<[f32; SLOTS]>,
 }
 
 impl LightMatter {
@@ -36,10 +38,10 @@ impl LightMatter {
             && volume.labels().is_none()
             && volume.colors().is_none()
             && transfer.gradient_opacity.is_none();
-        let of_bricks = |bricks: &[Brick]| {
+        let of_bricks = |bricks: &[Brick], amounts: &mut [[f32; SLOTS]]| {
             // Most volumes have few values.
             let mut known = [(f32::NAN, 0.0); KNOWN];
-            let of_voxel = |(_, voxel): (u32, UVec3)| {
+            let mut of_voxel = |voxel: UVec3| {
                 let value = volume.value(voxel);
                 let bits = value.to_bits();
                 let (of, known) = &mut known[(bits ^ bits >> 16) as usize % KNOWN];
@@ -48,28 +50,20 @@ impl LightMatter {
                 }
                 *known
             };
-            bricks.iter().flat_map(brick::voxels).map(of_voxel).collect::<Vec<_>>()
+            for (brick, amounts) in bricks.iter().zip(amounts) {
+                brick::voxels(brick).for_each(|(slot, voxel)| amounts[slot as usize] = of_voxel(voxel));
+            }
         };
-        let amounts: Vec<Vec<f32>> = bricks.par_chunks(BRICKS).map(of_bricks).collect();
-        let next = |sum: &mut u32, brick: &Brick| {
-            let start = *sum;
-            *sum += brick::present(brick).count_ones();
-            Some(start)
-        };
-        let starts = bricks.iter().scan(0, next).collect();
-        Self { grid: *volume.grid(), bricks, starts, amounts: amounts.concat() }
+        let mut amounts = vec![[0.0; SLOTS]; bricks.len()];
+        let chunks = bricks.par_chunks(BRICKS).zip(amounts.par_chunks_mut(BRICKS));
+        chunks.for_each(|(bricks, amounts)| of_bricks(bricks, amounts));
+        Self { grid: *volume.grid(), bricks, amounts }
     }
 
-    /// The voxels of a brick, given by its number: the slots and the amounts.
+    /// The amounts of a brick's voxels, by slot.
     #[inline(always)]
-    pub(super) fn voxels(&self, number: usize) -> impl Iterator<Item = (u32, f32)> + '_ {
-        let mut left = brick::present(&self.bricks[number]);
-        let slots = std::iter::from_fn(move || {
-            let slot = left.trailing_zeros();
-            left &= left.wrapping_sub(1);
-            (slot < brick::BRICK_VOXELS).then_some(slot)
-        });
-        slots.zip(self.amounts[self.starts[number] as usize..].iter().copied())
+    pub(super) fn amounts(&self, number: usize) -> &[f32; SLOTS] {
+        &self.amounts[number]
     }
 }
 

@@ -2,19 +2,25 @@
 
 use glam::{DVec3, DVec4};
 
+use super::band::Band;
 use super::box_filter::{Area, BoxFilter};
-use super::lit::Lit;
 use super::matter::LightMatter;
 use super::splat::Splatter;
 use super::view::LightView;
 use crate::kernel::Kernel;
-use crate::lists::quad_plan::Overlaps;
 use crate::parallel::prelude::*;
+use crate::volume::Grid;
+
+/// Where a grid's voxel (0, 0, 0) lies, in `unit`s from the world's origin.
+fn first_voxel(grid: &Grid) -> DVec3 {
+    grid.place() / grid.unit() - grid.center() * grid.aspect()
+}
 
 /// The light that each plane gets from one direction.
 #[derive(Clone, Debug)]
 pub struct LightSheets {
-    rows: [DVec4; 3],
+    /// Rows whose products with positions (x, y, z, 1), in `unit`s from the world's origin, are places as [`Self::rows`] tells.
+    place: [DVec4; 3],
     /// The pixels along each side of a plane.
     pub side: usize,
     /// The number of the first plane, before the first slab that any kernel touches.
@@ -41,11 +47,16 @@ impl LightSheets {
         variances: [f64; N],
         mut memory: [Vec<f32>; N],
     ) -> [Self; N] {
-        let slabs = Overlaps::count(&matter.bricks, &light.view).slabs;
+        let slabs = light.slabs(&matter.bricks);
         let ([x, y, plane], side) = (light.place, light.side);
         let rows = [x, y, plane - DVec4::W * f64::from(slabs.start)];
+        let (aspect, first) = (matter.grid.aspect(), first_voxel(&matter.grid));
+        let place = rows.map(|row| {
+            let of_position = row.truncate() / aspect;
+            of_position.extend(row.w - of_position.dot(first))
+        });
         if slabs.is_empty() {
-            return variances.map(|_| Self { rows, side, first: 0, planes: 0, light: Vec::new() });
+            return variances.map(|_| Self { place, side, first: 0, planes: 0, light: Vec::new() });
         }
         let (pixels, count) = (side * side, slabs.len());
         let mut number = 0;
@@ -57,21 +68,37 @@ impl LightSheets {
             Growing { filter: BoxFilter::new(variance), area: Area::NONE, light }
         });
         let splatter = Splatter::new(matter, light, kernel, slabs.start);
-        let (mut passed, mut along_x) = (vec![1.0; pixels], vec![0.0; pixels]);
-        for k in 0..count {
+        let (mut bands, height) = Band::<N>::all(&splatter);
+        for (k, begun) in splatter.begun(count).into_iter().enumerate() {
+            for Growing { filter, area, .. } in &mut stacks {
+                *area = area.and(begun).grown(filter.reach(), side);
+            }
             let planes = stacks.each_ref().map(|stack| &stack.light[k * pixels..(k + 1) * pixels]);
-            let lit = Lit::of(&planes, side);
-            let touched = splatter.slab(k, &lit, &mut passed);
-            for Growing { filter, area, light } in &mut stacks {
-                *area = area.and(touched).grown(filter.reach(), side);
+            bands.par_iter_mut().for_each(|band| {
+                band.draw(&splatter, k, &planes);
+                for ((Growing { filter, area, .. }, plane), number) in stacks.iter().zip(planes).zip(0..) {
+                    band.spread(number, (filter, area), plane);
+                }
+            });
+            let bands = &bands;
+            for (number, Growing { filter, area, light }) in stacks.iter_mut().enumerate() {
+                let (rows, columns) = (area.low[1]..area.end[1], area.low[0]..area.end[0]);
                 if area.is_empty() {
                     continue;
                 }
-                let (before, after) = light.split_at_mut((k + 1) * pixels);
-                filter.spread(side, *area, (&before[k * pixels..], &passed), &mut along_x, &mut after[..pixels]);
+                let plane = &mut light[(k + 1) * pixels..][..pixels];
+                plane.par_chunks_mut(side).enumerate().with_min_len(height).for_each(|(y, to)| {
+                    let row = |offset: isize| {
+                        let y = y.checked_add_signed(offset).filter(|y| *y < side)?;
+                        Some(&bands[y / height].along[number][y % height * side..][..side])
+                    };
+                    if rows.contains(&y) {
+                        filter.down(columns.clone(), row, to);
+                    }
+                });
             }
         }
-        stacks.map(|stack| Self { rows, side, first: slabs.start, planes: count + 1, light: stack.light })
+        stacks.map(|stack| Self { place, side, first: slabs.start, planes: count + 1, light: stack.light })
     }
 
     /// The number of planes; 0 if no voxel takes part.
@@ -79,15 +106,11 @@ impl LightSheets {
         self.planes
     }
 
-    /// Rows whose products with voxel coordinates (i, j, k, 1) are where a point is looked up: in pixels right of the first one's centre and below it, and in
-    /// planes from the first one on.
-    pub fn rows(&self) -> [DVec4; 3] {
-        self.rows
-    }
-
-    /// T at a point in voxel coordinates.
-    pub fn at(&self, voxel: DVec3) -> f32 {
-        self.at_place(self.rows().map(|row| row.dot(voxel.extend(1.0)) as f32))
+    /// Rows whose products with voxel coordinates (i, j, k, 1) of a grid of the volume, of any level or box, are where a point is looked up: in pixels right of
+    /// the first one's centre and below it, and in planes from the first one on.
+    pub fn rows(&self, grid: &Grid) -> [DVec4; 3] {
+        let (aspect, first) = (grid.aspect(), first_voxel(grid));
+        self.place.map(|row| (row.truncate() * aspect).extend(row.w + row.truncate().dot(first)))
     }
 
     /// T at a place as [`Self::rows`] gives it: bilinear between pixel centres, 1 beyond the image, linear between planes, and that of the first and the last

@@ -1,46 +1,34 @@
-//! The amounts a_k of a light sheet (SPEC §14): kernel sections of §5, as the light that passes them, `exp(-a_k)`.
-//!
-//! A band of rows is one thread's, and takes its bricks in one order.
+//! The amounts a_k of light sheets (SPEC §14): kernel sections of §5, in the geometry of one view. [`super::band`] adds them up.
+
+use std::ops::Range;
 
 use glam::DVec4;
 
 use super::box_filter::Area;
-use super::lit::Lit;
-use super::matter::LightMatter;
-use super::profile::{Profile, least, most, nearest, passed};
+use super::matter::{LightMatter, SLOTS};
+use super::profile::{Profile, least, most, nearest};
 use super::view::LightView;
-use super::window::{Places, Window};
+use super::window::Window;
 use crate::geometry::slab::SlabGrid;
 use crate::kernel::Kernel;
-use crate::lists::brick::{self, BRICK_VOXELS};
+use crate::lists::brick;
 use crate::lists::bucket::Buckets;
 use crate::parallel::prelude::*;
 
-/// The rows of a band.
-const ROWS: usize = 16;
-
 /// Where a brick lies in a light's view.
 #[derive(Clone, Debug)]
-struct Placed {
+pub(super) struct Placed {
     /// Its first slot: pixels right of the first pixel's centre and below it, and slabs from the first one's near plane on.
-    first: [f32; 3],
+    pub(super) first: [f32; 3],
     /// The pixels that its footprints may reach.
-    area: Area,
-}
-
-/// A voxel's section in a slab.
-struct Section {
-    /// The pixel coordinates, from the band's first pixel.
-    center: [f32; 2],
-    /// The slab's planes, grid units along the ray from the voxel.
-    planes: [f32; 2],
-    /// The amount per `unit`, scaled.
-    amount: f32,
+    pub(super) area: Area,
+    /// The slabs that its kernels may reach, counted from the first one.
+    pub(super) slabs: Range<i32>,
 }
 
 /// How footprints are drawn.
 #[derive(Debug)]
-enum Shape {
+pub(super) enum Shape {
     /// Round ones of a radius of at most 2 pixels.
     Small(Window<4>),
     /// Round ones of a radius of at most 4 pixels.
@@ -51,7 +39,7 @@ enum Shape {
 
 /// Footprints that are ellipses.
 #[derive(Debug)]
-struct Ellipse {
+pub(super) struct Ellipse {
     profile: Profile,
     /// ρ² of a pixel offset (x, y): the coefficients of x², xy and y².
     metric: [f32; 3],
@@ -62,19 +50,61 @@ struct Ellipse {
 /// The voxels of a volume, as a light sees them.
 #[derive(Debug)]
 pub(super) struct Splatter<'a> {
-    matter: &'a LightMatter,
-    shape: Shape,
-    side: usize,
+    pub(super) matter: &'a LightMatter,
+    pub(super) shape: Shape,
+    pub(super) side: usize,
     /// By slot, from a brick's first one: pixels right, pixels down, slabs.
-    slots: [[f32; BRICK_VOXELS as usize]; 3],
+    pub(super) slots: [[f32; 3]; SLOTS],
+    pub(super) depths: Depths,
     /// `1/λ`, times the low-pass rule's amplitude.
-    scale: f32,
+    pub(super) scale: f32,
     /// Grid units along a kernel's ray to a slab's width.
+    pub(super) slab_width: f32,
+    /// A kernel's reach in slabs.
+    pub(super) reach: f32,
+    pub(super) placed: Vec<Placed>,
+    /// The bricks by their first slab.
+    pub(super) order: Vec<u32>,
+}
+
+/// Which slots of a brick may reach a slab.
+#[derive(Debug)]
+pub(super) struct Depths {
+    /// The least depth of a slot, in slabs from the first slot.
+    least: f32,
+    /// Intervals per slab.
     per_slab: f32,
     /// A kernel's reach in slabs.
     reach: f32,
-    placed: Vec<Placed>,
-    buckets: Buckets,
+    /// The slots whose depths are less than those at which intervals begin.
+    below: [u64; INTERVALS + 3],
+}
+
+/// The intervals from the least depth of a slot to the greatest.
+const INTERVALS: usize = 64;
+
+impl Depths {
+    fn new(slots: &[[f32; 3]; SLOTS], reach: f32) -> Self {
+        let depths = slots.map(|[_, _, depth]| depth);
+        let least = depths.into_iter().fold(f32::INFINITY, f32::min);
+        let most = depths.into_iter().fold(f32::NEG_INFINITY, f32::max);
+        let per_slab = INTERVALS as f32 / (most - least);
+        let is_below = |depth: f32, at: usize| (depth - least) * per_slab < at as f32;
+        let bits = |at: usize| {
+            depths.iter().enumerate().fold(0, |bits, (slot, &depth)| bits | u64::from(is_below(depth, at)) << slot)
+        };
+        Self { least, per_slab, reach, below: std::array::from_fn(bits) }
+    }
+
+    /// The slots whose kernels reach a slab, and perhaps a few more, given the depth of the first slot in slabs from the slab's near plane on.
+    #[inline(always)]
+    pub(super) fn reaching(&self, depth: f32) -> u64 {
+        let interval = |depth: f32| ((depth - self.least) * self.per_slab) as i32;
+        let below = |at: i32| self.below[(at.max(0) as usize).min(INTERVALS + 2)];
+        // An interval more at both ends, since casts round towards 0 and numbers are rounded.
+        below(interval(1.0 + self.reach - depth).saturating_add(2))
+            & !below(interval(-self.reach - depth).saturating_sub(1))
+    }
 }
 
 impl<'a> Splatter<'a> {
@@ -98,124 +128,63 @@ impl<'a> Splatter<'a> {
                 ]
             });
             let depths = view.depths(center, half);
-            let placed = Placed {
+            Placed {
                 first: [x, y, depth].map(|row| row.dot(brick::origin(brick).as_dvec3().extend(1.0)) as f32),
                 area: Area { low: area.map(|[low, _]| low), end: area.map(|[_, end]| end) },
-            };
-            (placed, slabs.touched(depths.start, depths.end))
+                slabs: slabs.touched(depths.start, depths.end),
+            }
         };
-        let (placed, touched): (Vec<Placed>, Vec<_>) = matter.bricks.par_iter().map(of_brick).unzip();
-        let slots = [x, y, depth].map(|row| {
-            let offset = |slot: usize| brick::in_brick(slot as u32).as_dvec3();
-            std::array::from_fn(|slot| row.truncate().dot(offset(slot)) as f32)
+        let placed: Vec<Placed> = matter.bricks.par_iter().map(of_brick).collect();
+        let touched: Vec<Range<i32>> = placed.iter().map(|placed| placed.slabs.clone()).collect();
+        let slots = std::array::from_fn(|slot| {
+            let offset = brick::in_brick(slot as u32).as_dvec3();
+            [x, y, depth].map(|row| row.truncate().dot(offset) as f32)
         });
+        let reach = (view.reach / slabs.width) as f32;
         Self {
             matter,
             shape: Shape::new(light, kernel, slabs.width),
             side,
+            depths: Depths::new(&slots, reach),
             slots,
             scale: (view.footprint.amplitude / view.lambda) as f32,
-            per_slab: slabs.width as f32,
-            reach: (view.reach / slabs.width) as f32,
+            slab_width: slabs.width as f32,
+            reach,
             placed,
-            buckets: Buckets::sort(&touched),
+            order: Buckets::sort(&touched).order,
         }
     }
 
-    /// The light that passes a slab, counted from the first one, at each pixel; and the pixels at which it is not all. Bricks are left out whose pixels are
-    /// dark.
-    pub(super) fn slab(&self, slab: usize, lit: &Lit, passed: &mut [f32]) -> Area {
-        let range = self.buckets.touching(slab as i32);
-        let listed = self.buckets.order[range.start as usize..range.end as usize].par_iter();
-        let shown: Vec<u32> =
-            listed.copied().filter(|&number| !lit.is_dark(&self.placed[number as usize].area)).collect();
-        let areas = shown.iter().map(|&number| self.placed[number as usize].area);
-        let touched = areas.fold(Area::NONE, Area::and);
-        let windows = match &self.shape {
-            Shape::Small(_) => Some(lit.windows::<4>(self.side)),
-            Shape::Large(_) => Some(lit.windows::<8>(self.side)),
-            Shape::Ellipse(_) => None,
-        };
-        let mut by_band = vec![Vec::new(); self.side.div_ceil(ROWS)];
-        for &brick in &shown {
-            let Area { low, end } = self.placed[brick as usize].area;
-            by_band[low[1] / ROWS..end[1].div_ceil(ROWS)].iter_mut().for_each(|bricks| bricks.push(brick));
+    /// The pixels that footprints may reach of the bricks that begin in each of some number of slabs.
+    pub(super) fn begun(&self, slabs: usize) -> Vec<Area> {
+        let mut areas = vec![Area::NONE; slabs];
+        for Placed { area, slabs: touched, .. } in &self.placed {
+            let begun = &mut areas[(touched.start.max(0) as usize).min(slabs - 1)];
+            *begun = begun.and(*area);
         }
-        let bands = passed.par_chunks_mut(ROWS * self.side).zip(by_band.par_iter()).enumerate();
-        bands.for_each(|(number, (passed, bricks))| {
-            if bricks.is_empty() {
-                passed.fill(1.0);
-                return;
-            }
-            let first_row = number * ROWS;
-            let within = (slab, first_row);
-            match (&self.shape, &windows) {
-                (Shape::Small(window), Some(lit)) => self.draw_windows(window, within, (bricks, lit), passed),
-                (Shape::Large(window), Some(lit)) => self.draw_windows(window, within, (bricks, lit), passed),
-                (Shape::Ellipse(ellipse), _) => {
-                    passed.fill(0.0);
-                    self.sections(slab, first_row, bricks, |section| ellipse.add(&section, self.side, passed));
-                    passed.iter_mut().for_each(|pixel| *pixel = self::passed(*pixel));
-                }
-                _ => {}
-            }
-        });
-        touched
+        areas
     }
 
-    /// Calls `add` with the sections of some bricks in a slab.
-    #[inline(always)]
-    fn sections(&self, slab: usize, first_row: usize, bricks: &[u32], mut add: impl FnMut(Section)) {
-        for &brick in bricks {
-            let [x, y, depth] = self.placed[brick as usize].first;
-            let (y, depth) = (y - first_row as f32, depth - slab as f32);
-            for (slot, amount) in self.matter.voxels(brick as usize) {
-                let slot = slot as usize % BRICK_VOXELS as usize;
-                let [right, down, behind] = self.slots.each_ref().map(|offsets| offsets[slot]);
-                let depth = depth + behind;
-                if depth + self.reach > 0.0 && depth - self.reach < 1.0 {
-                    let planes = [-depth * self.per_slab, (1.0 - depth) * self.per_slab];
-                    add(Section { center: [x + right, y + down], planes, amount: amount * self.scale });
-                }
-            }
+    /// The maximum number of slabs that a kernel reaches.
+    pub(super) fn slabs_of_kernel(&self) -> usize {
+        (2.0 * self.reach).ceil() as usize + 2
+    }
+
+    /// The rows that sums have above and below those of a band, and the columns beside the image.
+    pub(super) fn margin(&self) -> usize {
+        match self.shape {
+            Shape::Small(_) => 4,
+            Shape::Large(_) => 8,
+            Shape::Ellipse(_) => 0,
         }
     }
 
-    /// Draws the sections of some bricks in a slab by windows, of those that have light.
-    fn draw_windows<const W: usize>(
-        &self,
-        window: &Window<W>,
-        (slab, first_row): (usize, usize),
-        (bricks, lit): (&[u32], &Lit),
-        passed: &mut [f32],
-    ) {
-        let (rows, stride) = (passed.len() / self.side, self.side + 2 * W);
-        // With room for windows at every side.
-        let mut sums = vec![0.0; (rows + 2 * W) * stride];
-        let mut places = Places::default();
-        for &brick in bricks {
-            let [x, y, depth] = self.placed[brick as usize].first;
-            // All slots, without a branch, so that the loops are vectorized.
-            window.place(&self.slots, [x, y, depth - slab as f32], &mut places);
-            for (slot, amount) in self.matter.voxels(brick as usize) {
-                let slot = slot as usize % BRICK_VOXELS as usize;
-                let [left, top] = [places.left[slot], places.top[slot]];
-                let row = top - first_row as i32;
-                let is_in_band = row > -(W as i32) && row < rows as i32;
-                let is_in_image = left > -(W as i32) && left < self.side as i32;
-                if !(is_in_band && is_in_image && window.reaches(&places, slot)) {
-                    continue;
-                }
-                let last = [left, top].map(|first| (first + W as i32 - 1) as usize);
-                if top > -(W as i32) && top < self.side as i32 && lit.has(last) {
-                    let first = (row + W as i32) as usize * stride + (left + W as i32) as usize;
-                    window.add(&places, slot, amount * self.scale, (&mut sums[first..], stride));
-                }
-            }
-        }
-        let sums = sums.chunks_exact(stride).skip(W);
-        for (passed, sums) in passed.chunks_exact_mut(self.side).zip(sums) {
-            passed.iter_mut().zip(&sums[W..]).for_each(|(passed, &sum)| *passed = self::passed(sum));
+    /// The rows beyond a band that footprints with pixels in the band reach.
+    pub(super) fn rows_of_kernel(&self) -> usize {
+        match &self.shape {
+            Shape::Small(_) => 3,
+            Shape::Large(_) => 7,
+            Shape::Ellipse(ellipse) => (2.0 * ellipse.half_height).ceil() as usize + 1,
         }
     }
 }
@@ -243,10 +212,10 @@ impl Shape {
 }
 
 impl Ellipse {
-    /// Adds a section to the sums of a band of rows, `side` pixels wide.
+    /// Adds a voxel's section between two planes, in grid units along the ray from the voxel, to the sums of a band of rows, `side` pixels wide, from whose
+    /// first pixel its place is given.
     #[inline(always)]
-    fn add(&self, section: &Section, side: usize, sums: &mut [f32]) {
-        let Section { center: [x, y], planes, amount } = *section;
+    pub(super) fn add(&self, [x, y]: [f32; 2], planes: [f32; 2], amount: f32, side: usize, sums: &mut [f32]) {
         let [near, far] = planes.map(|plane| self.profile.along(plane));
         let [xx, xy, yy] = self.metric;
         let rows = (sums.len() / side) as i32;

@@ -1,10 +1,15 @@
 //! The geometry of light sheets towards one direction (SPEC §14), which is that of §5 seen from the light.
 
+use std::ops::Range;
+
 use glam::{DVec3, DVec4};
 
 use crate::error::RenderError;
 use crate::error::setting::{SettingError, scaled};
 use crate::geometry::view_geometry::ViewGeometry;
+use crate::lists::brick::{self, Brick};
+use crate::lists::quad_plan::Overlaps;
+use crate::parallel::prelude::*;
 use crate::scene::Scene;
 use crate::settings::camera::{Camera, Projection, least_axis};
 use crate::settings::splatting::Splatting;
@@ -34,8 +39,7 @@ impl LightView {
     /// If a stack would take more than 4 GiB.
     pub(super) fn new(grid: &Grid, scene: &Scene, up: DVec3, to_light: DVec3) -> Result<Self, RenderError> {
         let (step, radius) = (scene.shading.light_step, scene.splatting.radius);
-        let half = (grid.bounding_radius(radius) / grid.unit() / step).ceil();
-        let side = 2.0 * half + 1.0;
+        let side = side(grid.bounding_radius(radius) / grid.unit(), step);
         let bytes = side * side * side * size_of::<f32>() as f64;
         if bytes > MOST_BYTES {
             let found = format!("{step}, so {:.1} GB of light sheets", bytes / 1e9);
@@ -56,9 +60,34 @@ impl LightView {
         let bias = radius * (aspect * to_light).length() * to_light / aspect;
         let moved = |row: DVec4| row + DVec4::W * row.truncate().dot(bias);
         let [x, y, depth, _] = view.screen_from_voxel;
+        let half = (side - 1.0) / 2.0;
         let place = [moved(x) + DVec4::W * half, moved(y) + DVec4::W * half, moved(depth) / view.slabs.width];
         Ok(Self { view, side: side as usize, place })
     }
+
+    /// The slabs that the kernels of any voxels reach; empty without any. Only voxels of bricks are looked at that may be the first or the last.
+    pub(super) fn slabs(&self, bricks: &[Brick]) -> Range<i32> {
+        let view = &self.view;
+        let depths = |brick: &Brick| {
+            let (center, half) = brick::bounds(brick);
+            view.depths(center, half)
+        };
+        // A brick's last voxel at most is the first that a kernel of the brick surrounds, and its first voxel at least is the last.
+        let of_brick = |brick: &Brick| [depths(brick).end - 2.0 * view.reach, -depths(brick).start - 2.0 * view.reach];
+        let least = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].min(b[1])];
+        let has_voxels = |brick: &&Brick| brick::present(brick) != 0;
+        let [near, far] = bricks.par_iter().filter(has_voxels).map(of_brick).reduce(|| [f64::INFINITY; 2], least);
+        // Wider than rounding errors.
+        let margin = view.slabs.width * 1e-6;
+        let is_at_an_end = |brick: &Brick| depths(brick).start <= near + margin || -depths(brick).end <= far + margin;
+        let ends: Vec<Brick> = bricks.par_iter().filter(|brick| is_at_an_end(brick)).copied().collect();
+        Overlaps::count(&ends, view).slabs
+    }
+}
+
+/// The pixels along each side of sheets with some step, for a scene whose sphere has some radius, both in `unit`s.
+pub(super) fn side(radius: f64, step: f64) -> f64 {
+    2.0 * (radius / step).ceil() + 1.0
 }
 
 /// The camera's `up`, of length 1, or, where it is nearly along the light, the world axis least along that.

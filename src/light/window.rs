@@ -4,7 +4,6 @@
 
 use super::profile::nearest;
 use crate::kernel::Kernel;
-use crate::lists::brick::BRICK_VOXELS;
 
 /// The intervals of tables by distance.
 const INTERVALS: usize = 256;
@@ -33,27 +32,6 @@ pub(super) struct Window<const W: usize> {
     reach: f32,
     /// Intervals of sections per slab.
     per_slab: f32,
-}
-
-/// Where the voxels of a brick are, by slot.
-#[derive(Debug)]
-pub(super) struct Places {
-    /// The first pixel of their windows.
-    pub(super) left: [i32; SLOTS],
-    pub(super) top: [i32; SLOTS],
-    /// The places in tables: across, downwards, and of sections.
-    right: [f32; SLOTS],
-    down: [f32; SLOTS],
-    depth: [f32; SLOTS],
-}
-
-const SLOTS: usize = BRICK_VOXELS as usize;
-
-impl Default for Places {
-    fn default() -> Self {
-        let none = [0.0; SLOTS];
-        Self { left: [0; SLOTS], top: [0; SLOTS], right: none, down: none, depth: none }
-    }
 }
 
 impl<const W: usize> Window<W> {
@@ -103,30 +81,14 @@ impl<const W: usize> Window<W> {
         }
     }
 
-    /// Finds where the voxels of a brick are, given their offsets from its first slot and where that is: in pixels and in slabs from a slab's near plane.
-    pub(super) fn place(&self, [right, down, behind]: &[[f32; SLOTS]; 3], [x, y, depth]: [f32; 3], to: &mut Places) {
-        let nearest_first = W as f32 / 2.0 - 0.5;
-        let least = W as f32 / 2.0 - 1.0;
-        let axes = [(x, right, &mut to.left, &mut to.right), (y, down, &mut to.top, &mut to.down)];
-        for (start, offsets, first, places) in axes {
-            for ((offset, first), at) in offsets.iter().zip(first).zip(places) {
-                let place = start + offset;
-                *first = nearest(place - nearest_first);
-                *at = (place - *first as f32 - least) * INTERVALS as f32;
-            }
-        }
-        for (offset, at) in behind.iter().zip(&mut to.depth) {
-            *at = (depth + offset + self.reach) * self.per_slab;
-        }
-    }
-
-    /// Whether a voxel's kernel reaches the slab.
+    /// The first pixel along an axis of the window of a voxel at some place, and where it is in the table of Gaussians.
     #[inline(always)]
-    pub(super) fn reaches(&self, places: &Places, slot: usize) -> bool {
-        places.depth[slot] > 0.0 && places.depth[slot] < (self.sections.len() - 1) as f32
+    pub(super) fn first(place: f32) -> (i32, f32) {
+        let first = nearest(place - (W as f32 / 2.0 - 0.5));
+        (first, (place - first as f32 - (W as f32 / 2.0 - 1.0)) * INTERVALS as f32)
     }
 
-    /// The Gaussian at a window's pixels, and the place within the pixel.
+    /// The Gaussian at a window's pixels along an axis, and the place within the pixel.
     #[inline(always)]
     fn across(&self, at: f32) -> ([f32; W], usize) {
         let whole = nearest(at);
@@ -137,22 +99,41 @@ impl<const W: usize> Window<W> {
         (gauss, (number * PLACES + INTERVALS / 2) / INTERVALS)
     }
 
-    /// Adds the section of a voxel that reaches the slab to sums in rows of some length, from its window's first pixel on.
+    /// A voxel's footprint, less what its section in a slab takes of the ray, given its places across and downwards in the table of Gaussians.
     #[inline(always)]
-    pub(super) fn add(&self, places: &Places, slot: usize, amount: f32, (sums, stride): (&mut [f32], usize)) {
-        let depth = places.depth[slot];
-        let whole = nearest(depth);
-        let [section, slope] = self.sections[(whole as usize).min(self.sections.len() - 1)];
-        let amount = amount * (section + slope * (depth - whole as f32));
-        let (right, place_right) = self.across(places.right[slot]);
-        let (down, place_down) = self.across(places.down[slot]);
-        let shares = &self.shares[place_down * (PLACES + 1) + place_right];
-        for ((row, down), shares) in sums.chunks_mut(stride).zip(down).zip(shares) {
+    pub(super) fn footprint(&self, [right, down]: [f32; 2], amount: f32) -> [[f32; W]; W] {
+        let (right, place_right) = self.across(right);
+        let (down, place_down) = self.across(down);
+        let mut footprint = self.shares[place_down * (PLACES + 1) + place_right];
+        for (row, down) in footprint.iter_mut().zip(down) {
             let weight = amount * down;
-            for ((sum, right), share) in row[..W].iter_mut().zip(right).zip(shares) {
-                *sum += right * share * weight;
-            }
+            row.iter_mut().zip(right).for_each(|(share, right)| *share *= right * weight);
         }
+        footprint
+    }
+
+    /// Where a voxel whose depth is given in slabs, from a slab's near plane on, is in the table of sections. The next slab's place is [`Self::slab`] less; a
+    /// kernel has ended where places are not above 0.
+    #[inline(always)]
+    pub(super) fn depth(&self, depth: f32) -> f32 {
+        (depth + self.reach) * self.per_slab
+    }
+
+    /// Intervals from slab to slab.
+    #[inline(always)]
+    pub(super) fn slab(&self) -> f32 {
+        self.per_slab
+    }
+
+    /// The part of a kernel in a slab along its central ray, by its place above 0; `None` before the kernel begins to reach it.
+    #[inline(always)]
+    pub(super) fn section(&self, at: f32) -> Option<f32> {
+        let whole = nearest(at);
+        if at >= (self.sections.len() - 1) as f32 {
+            return None;
+        }
+        let [section, slope] = self.sections[whole as usize];
+        Some(section + slope * (at - whole as f32))
     }
 }
 
@@ -170,12 +151,15 @@ mod tests {
             let mut worst: f64 = 0.0;
             for place in [4.0, 4.13, 4.5, 4.501, 4.77] {
                 for depth in [-0.8, -0.2, 0.0, 0.51, 1.3] {
-                    let mut places = Places::default();
-                    window.place(&[[0.0; SLOTS]; 3], [place, 5.3, depth as f32], &mut places);
+                    let ((left, right), (top, down)) = (Window::<4>::first(place), Window::<4>::first(5.3));
+                    let footprint = window.footprint([right, down], 1.0);
+                    let at = window.depth(depth as f32);
+                    let section = if at > 0.0 { window.section(at).unwrap_or(0.0) } else { 0.0 };
                     let mut sums = vec![0.0; 20 * 17];
-                    let first = (places.left[0] + 4) as usize + (places.top[0] + 4) as usize * 20;
-                    if window.reaches(&places, 0) {
-                        window.add(&places, 0, 1.0, (&mut sums[first..], 20));
+                    for (row, y) in footprint.iter().zip(top + 4..) {
+                        row.iter()
+                            .zip(left + 4..)
+                            .for_each(|(&pixel, x)| sums[(x + y * 20) as usize] = pixel * section);
                     }
                     for (at, &sum) in sums.iter().enumerate() {
                         let [column, row] = [at % 20, at / 20].map(|at| at as f64 - 4.0);

@@ -2,9 +2,10 @@
 
 use std::path::Path;
 
+use crate::light::StreamedLight;
 use crate::scene::{OpenVolume, Scene, SceneError, VolumeSource};
 use crate::settings::splatting::Rasterizer;
-use crate::volume::{StreamedVolume, Volume};
+use crate::volume::{StreamedVolume, Thinned, Volume};
 
 /// The text that begins what is hashed; another meaning of fingerprints needs another text.
 const DOMAIN: &str = "sheetsplat part 1\n";
@@ -19,6 +20,7 @@ pub fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, SceneEr
     if let OpenVolume::Streamed(_) = volume {
         explicit.splatting = explicit.splatting.streamed();
     }
+    let is_lit = explicit.shading.light_key().is_some();
     let mut hash = blake3::Hasher::new();
     hash.update(DOMAIN.as_bytes()).update(settings(explicit)?.as_bytes());
     let grid = volume.grid();
@@ -33,7 +35,13 @@ pub fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, SceneEr
     }
     match volume {
         OpenVolume::Whole(volume) => add_values(&mut hash, volume),
-        OpenVolume::Streamed(volume) => add_identities(&mut hash, volume),
+        OpenVolume::Streamed(volume) => {
+            add_identities(&mut hash, volume);
+            if is_lit {
+                let Thinned { level, stride, .. } = StreamedLight::thinned(volume);
+                hash.update(b"\nlight ").update(&(level as u64).to_le_bytes()).update(&stride.to_le_bytes());
+            }
+        }
     }
     Ok(hash.finalize().to_hex().to_string())
 }

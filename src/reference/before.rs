@@ -111,10 +111,10 @@ pub(super) fn render_for(
 pub(super) fn part(
     volume: &Volume,
     transfer: &TransferFunction,
-    scene: &Scene,
+    (scene, lights): (&Scene, Option<&Arc<Lights>>),
     Window { slabs, region }: &Window,
 ) -> Result<Content, RenderError> {
-    let frame = Frame::new(volume, transfer, (scene, None))?;
+    let frame = Frame::new(volume, transfer, (scene, lights))?;
     let acc = Picture::drawn(&frame, scene, (Host::default(), slabs.clone()), None).acc;
     let rows = acc.pixels.chunks(acc.width).skip(region.rows().start).take(region.rows().len());
     let colors = rows.flat_map(|row| &row[region.columns()]).map(|pixel| pixel.as_vec4().to_array());

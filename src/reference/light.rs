@@ -18,15 +18,19 @@ use crate::settings::clip::HalfSpace;
 use crate::settings::shading::Light;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::Volume;
+use crate::volume::{Grid, Volume};
 
 /// The light that a scene's shading takes from light sheets.
 #[derive(Clone, Debug, Default)]
 pub struct Lights {
     /// The amount of occlusion, and its sheets.
-    occlusion: Option<(f64, LightSheets)>,
+    occlusion: Option<(f64, Arc<LightSheets>)>,
     /// The amount of shadow, and its sheets.
-    shadow: Option<(f64, LightSheets)>,
+    shadow: Option<(f64, Arc<LightSheets>)>,
+    /// Where the grid's centre lies whose voxels light is made of, in `unit`s.
+    place: DVec3,
+    /// From that centre to that of the grid whose points are lit.
+    offset: DVec3,
 }
 
 /// A and S: what is left of ambient and of other light.
@@ -61,11 +65,13 @@ impl Lights {
         };
         let sheets = |amount: f64, to_light: DVec3, spread: f64| {
             let sheets = || LightSheets::new((volume, transfer), scene, to_light, spread);
-            (amount > 0.0).then(|| sheets().map(|sheets| (amount, sheets))).transpose()
+            (amount > 0.0).then(|| sheets().map(|sheets| (amount, Arc::new(sheets)))).transpose()
         };
         Ok(Self {
             occlusion: sheets(shading.occlusion, -basis.w, shading.occlusion_spread)?,
             shadow: sheets(shading.shadow, to_light, shading.shadow_spread)?,
+            place: volume.grid().place() / volume.grid().unit(),
+            offset: DVec3::ZERO,
         })
     }
 
@@ -79,9 +85,15 @@ impl Lights {
         given.map_or_else(|| Self::new(volume, transfer, scene).map(Arc::new), |given| Ok(Arc::clone(given)))
     }
 
+    /// The same light for points of another grid of the volume: of another level, or of a box.
+    pub fn on(&self, grid: &Grid) -> Self {
+        Self { offset: grid.place() / grid.unit() - self.place, ..self.clone() }
+    }
+
     /// The light that is left at a point, in `unit`s from the grid's centre.
     pub fn left(&self, p: DVec3) -> Left {
-        let left = |light: &Option<(f64, LightSheets)>| {
+        let p = p + self.offset;
+        let left = |light: &Option<(f64, Arc<LightSheets>)>| {
             light.as_ref().map_or(1.0, |(amount, sheets)| 1.0 - amount * (1.0 - sheets.at(p)))
         };
         Left { ambient: left(&self.occlusion), direct: left(&self.shadow) }

@@ -173,13 +173,26 @@ pub fn part(
     scene: &Scene,
     window: &Window,
 ) -> Result<Content, RenderError> {
+    lit_part(volume, transfer, (scene, None), window)
+}
+
+/// [`part`]; `lights` are those of all channels, or of the whole volume of a box, if they are not the volume's own.
+///
+/// # Errors
+/// As for [`part`].
+pub fn lit_part(
+    volume: &Volume,
+    transfer: &TransferFunction,
+    (scene, lights): (&Scene, Option<&Arc<Lights>>),
+    window: &Window,
+) -> Result<Content, RenderError> {
     let classification = scene.classification(volume);
     let joining = Joining::of(scene.splatting.compositing, classification);
     if joining == Some(Joining::Nearest) && channels(volume, transfer).nth(1).is_some() {
-        return after::nearest_part(volume, transfer, scene, window);
+        return after::nearest_part(volume, transfer, (scene, lights), window);
     }
     if classification == Classification::After {
-        return after::part(volume, transfer, scene, window);
+        return after::part(volume, transfer, (scene, lights), window);
     }
-    before::part(volume, transfer, scene, window)
+    before::part(volume, transfer, (scene, lights), window)
 }

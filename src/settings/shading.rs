@@ -16,9 +16,6 @@ pub(crate) const LIGHT_SPREAD: Interval = Interval::new(Bound::Included(0.0), Bo
 /// The steps of light sheets, in `unit`s.
 pub(crate) const LIGHT_STEP: Interval = Interval::new(Bound::Included(0.5), Bound::Included(16.0));
 
-/// Why light sheets of a volume that is streamed are refused, and what is allowed.
-pub(crate) const STREAMED_LIGHT: [&str; 2] = ["for a volume that is streamed", "0, or a volume that fits into memory"];
-
 /// The direction of the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
@@ -171,12 +168,5 @@ impl Shading {
             return Some("shading.occlusion");
         }
         (self.shadow > 0.0).then_some("shading.shadow")
-    }
-
-    /// Refuses light sheets where a way of drawing, in words, does not have them.
-    pub(crate) fn refuse_light(&self, by: &str, allowed: &str) -> Result<(), SettingError> {
-        let Some(key) = self.light_key() else { return Ok(()) };
-        let amount = if key == "shading.occlusion" { self.occlusion } else { self.shadow };
-        Err(SettingError::new(key, format!("{amount} {by}"), allowed))
     }
 }

@@ -15,10 +15,10 @@ use crate::common::store::MemoryStore;
 use crate::merging::headless;
 use crate::streamed::in_four;
 
-const BACKENDS: [Backend; 3] = [Backend::Reference, Backend::Gpu, Backend::Cpu];
+pub(crate) const BACKENDS: [Backend; 3] = [Backend::Reference, Backend::Gpu, Backend::Cpu];
 
 /// A head, from the second channel on mirrored along an axis each; the first one with its labels, if it is to have any.
-fn volume(channels: u32, has_labels: bool) -> Volume {
+pub(crate) fn volume(channels: u32, has_labels: bool) -> Volume {
     let head = builtin::volume("head:40").unwrap();
     let channel = |number: u32| {
         let grid = *head.grid();
@@ -39,7 +39,7 @@ fn volume(channels: u32, has_labels: bool) -> Volume {
 }
 
 /// The bytes of a volume's values, colours and labels.
-fn bytes(volume: &Volume) -> u64 {
+pub(crate) fn bytes(volume: &Volume) -> u64 {
     let labels = volume.labels().map_or(0, size_of_val);
     let of_channel = |channel: &Volume| 4 * channel.values().len() + channel.colors().map_or(0, size_of_val);
     (volume.channels().map(of_channel).sum::<usize>() + labels) as u64
@@ -57,7 +57,7 @@ fn colored() -> Volume {
 }
 
 /// The stores of a volume, the labels' last, and the volume as a stream of them, whose boxes take at most three quarters of the volume's bytes.
-fn streamed(volume: &Volume) -> (Vec<Arc<MemoryStore>>, StreamedVolume) {
+pub(crate) fn streamed(volume: &Volume) -> (Vec<Arc<MemoryStore>>, StreamedVolume) {
     let memory = 3 * bytes(volume);
     let mut stores: Vec<Arc<MemoryStore>> = (0..)
         .zip(volume.channels())
@@ -76,7 +76,7 @@ fn streamed(volume: &Volume) -> (Vec<Arc<MemoryStore>>, StreamedVolume) {
 }
 
 /// A scene of a volume of several channels, or of one.
-fn scene(channels: u32, sets: &[&str]) -> Scene {
+pub(crate) fn scene(channels: u32, sets: &[&str]) -> Scene {
     let transfer =
         |color: &str| format!("{{color=[[0,{color}],[255,[1,0.8,0.4]]],opacity=[[0,0],[40,0.02],[160,0.5]]}}");
     let colors = ["[0.3,0.5,0.9]", "[0.9,0.1,0.2]", "[0.2,0.9,0.3]"];

@@ -7,6 +7,7 @@ mod channels;
 #[path = "../common/mod.rs"]
 mod common;
 mod files;
+mod light;
 mod means;
 mod merging;
 mod random;

@@ -88,9 +88,12 @@ function show() {
     at("compositing").value = facts.compositing === facts.presetCompositing ? "" : facts.compositing;
     at("perspective").checked = facts.projection === "perspective";
     at("slab-width").max = Math.max(4, facts.slabWidth);
-    at("slab-width").value = facts.slabWidth;
-    at("slab-width").setAttribute("aria-valuetext", short(facts.slabWidth));
-    at("slab-width-value").textContent = short(facts.slabWidth);
+    const sliders = { "slab-width": facts.slabWidth, "occlusion": facts.occlusion, "shadow": facts.shadow };
+    for (const [id, value] of Object.entries(sliders)) {
+        at(id).value = value;
+        at(id).setAttribute("aria-valuetext", short(value));
+        at(`${id}-value`).textContent = short(value);
+    }
     showColormap(shown);
     for (const row of at("channels").children) {
         const number = Number(row.dataset.number);
@@ -255,7 +258,9 @@ function listenForSettings() {
     });
     at("add").addEventListener("click", () => plot.add());
     at("reset-transfer").addEventListener("click", () => change({ [of("opacity")]: null }));
-    at("slab-width").addEventListener("input", () => change({ "splatting.slab_width": Number(at("slab-width").value) }));
+    for (const [id, key] of [["slab-width", "splatting.slab_width"], ["occlusion", "shading.occlusion"], ["shadow", "shading.shadow"]]) {
+        at(id).addEventListener("input", () => change({ [key]: Number(at(id).value) }));
+    }
     at("compositing").addEventListener("change", () => change({ "splatting.compositing": at("compositing").value || null }));
     // Another projection is another camera.
     at("perspective").addEventListener("change", () => {

@@ -62,6 +62,10 @@ export interface Facts {
     /** The scene's preset; `null` if it names none. */
     preset: string | null;
     slabWidth: number;
+    /** How much of the ambient light matter in front keeps off, 0 to 1. */
+    occlusion: number;
+    /** How much of the other light matter towards the light keeps off, 0 to 1. */
+    shadow: number;
     compositing: string;
     /** The compositing that the preset, or the lack of one, chooses. */
     presetCompositing: string;

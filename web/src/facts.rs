@@ -27,6 +27,8 @@ pub(crate) struct Facts<'a> {
     /// The scene's preset.
     preset: Option<&'static str>,
     slab_width: f64,
+    occlusion: f64,
+    shadow: f64,
     compositing: &'static str,
     /// What the preset would choose.
     preset_compositing: &'static str,
@@ -84,6 +86,8 @@ impl<'a> Facts<'a> {
             colormaps: Colormap::ALL.iter().map(|(name, _)| *name).collect(),
             preset: preset.and_then(|preset| name_of(&Preset::ALL, preset)),
             slab_width: scene.splatting.slab_width,
+            occlusion: fitted.shading.occlusion,
+            shadow: fitted.shading.shadow,
             compositing: compositing_name(fitted.splatting.compositing),
             preset_compositing: compositing_name(of_preset),
             projection: projection_name(&scene.camera),

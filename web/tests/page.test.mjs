@@ -128,6 +128,9 @@ test("every control changes the picture, and a saved scene shows it again", asyn
     });
     await changes("a side of the box", () => shown.locator("#crop input").nth(1).fill("0"));
     await changes("an oblique plane", () => shown.check("#plane"));
+    await shown.locator("summary", { hasText: "Light" }).click();
+    await changes("occlusion", () => shown.locator("#occlusion").fill("0.7"));
+    await changes("a shadow", () => shown.locator("#shadow").fill("0.6"));
     await shown.locator("summary", { hasText: "Splatting" }).click();
     await changes("the slab width", () => shown.locator("#slab-width").fill("2"));
     await changes("a compositing", () => shown.selectOption("#compositing", "maximum"));
@@ -135,7 +138,7 @@ test("every control changes the picture, and a saved scene shows it again", asyn
     const [saved] = await Promise.all([shown.waitForEvent("download"), shown.click("#save-scene")]);
     assert.equal(saved.suggestedFilename(), "head.toml");
     const scene = readFileSync(await saved.path(), "utf8");
-    for (const words of ['builtin = "head:48"', "slab_width = 2", 'compositing = "maximum"', "crop = ", "planes = "]) {
+    for (const words of ['builtin = "head:48"', "slab_width = 2", "occlusion = 0.7", "shadow = 0.6", 'compositing = "maximum"', "crop = ", "planes = "]) {
         assert.ok(scene.includes(words), `${words} in\n${scene}`);
     }
     const last = await picture(shown);

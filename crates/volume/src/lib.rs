@@ -155,7 +155,7 @@ pub mod internals {
     pub use crate::resample::Resampling;
     pub use crate::sample_type::Sample;
     pub use crate::series::Selection;
-    pub use crate::streamed::{check_grids, sample_of_channels};
+    pub use crate::streamed::{Thinned, check_grids, sample_of_channels};
     pub use crate::texel::COLOR_BYTES;
     pub use crate::text::{plain, plain_lines, plain_whole};
     pub use crate::unit::unit;

@@ -20,7 +20,16 @@ const MOST_CHUNKS: u64 = 1000;
 pub fn sample(origin: &str, store: &dyn Store, memory: u64) -> Result<Volume, VolumeError> {
     let grids: Vec<Grid> = store.levels().iter().map(|level| level.grid).collect();
     let (number, step) = spread(&grids, memory / parts_of(store));
-    sample_at(origin, store, (number, step))
+    some(origin, sample_at(origin, store, (number, step), Chunks::Few)?)
+}
+
+/// Which chunks of a level are read for every nth voxel of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Chunks {
+    /// At most 1000, evenly spread, each of which stands for those around it.
+    Few,
+    /// All.
+    All,
 }
 
 /// The memory of a voxel of a store, counted in values.
@@ -39,14 +48,31 @@ pub(super) fn spread(grids: &[Grid], memory: u64) -> (usize, u32) {
     (number, (1..longest).find(|&step| fits_by(step)).unwrap_or(longest))
 }
 
-/// Every `step`th voxel of a level along each axis.
-pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize, u32)) -> Result<Volume, VolumeError> {
+/// A sample that has a finite value.
+///
+/// # Errors
+/// If it has none.
+pub(super) fn some(origin: &str, sample: Volume) -> Result<Volume, VolumeError> {
+    if sample.holes < sample.grid.voxels() {
+        return Ok(sample);
+    }
+    let found = "only NaN or infinite samples".to_owned();
+    Err(VolumeError::invalid(origin, "data", found, "at least one finite sample".to_owned()))
+}
+
+/// Every `step`th voxel of a level along each axis; all may be holes.
+pub(super) fn sample_at(
+    origin: &str,
+    store: &dyn Store,
+    (number, step): (usize, u32),
+    chunks: Chunks,
+) -> Result<Volume, VolumeError> {
     let levels = store.levels();
     let level = &levels[number];
     let dims = level.grid.dims.map(|count| count.div_ceil(step));
     let mut values = vec![0.0; dims.element_product() as usize];
     let mut colors = vec![Texel::default(); if store.has_colors() { values.len() } else { 0 }];
-    let (pieces, reads) = pieces(store, number, level, step)?;
+    let (pieces, reads) = pieces(store, (number, level), step, chunks)?;
     for piece in pieces {
         put(&piece.values, &piece, (&mut values, dims));
         put(&piece.colors, &piece, (&mut colors, dims));
@@ -57,13 +83,8 @@ pub(super) fn sample_at(origin: &str, store: &dyn Store, (number, step): (usize,
     let grid = Grid { turned: level.grid.turned, ..Grid::new(dims, spacing) };
     let place: DVec3 = level.grid.place() + center(&grid) - center(&level.grid);
     let grid = if number == 0 && step == 1 { level.grid } else { grid.coarser_than(&levels[0].grid, place) };
-    let count = values.len() as u64;
     let volume = Volume::punched(grid, Values::from(values).narrowed());
     let volume = if store.has_colors() { volume.with_texels(colors) } else { volume };
-    if volume.holes == count {
-        let found = "only NaN or infinite samples".to_owned();
-        return Err(VolumeError::invalid(origin, "data", found, "at least one finite sample".to_owned()));
-    }
     Volume { reads: Some(reads), ..volume }.stating(origin, store.facts())
 }
 
@@ -97,16 +118,17 @@ fn put<T: Copy>(own: &[T], Piece { from, dims: own_dims, .. }: &Piece, (to, dims
 /// Every `step`th voxel of a level, chunk by chunk; and what was read for it.
 fn pieces(
     store: &dyn Store,
-    number: usize,
-    level: &StoreLevel,
+    (number, level): (usize, &StoreLevel),
     step: u32,
+    chunks: Chunks,
 ) -> Result<(Vec<Piece>, StoreCounts), VolumeError> {
     let across = level.chunks();
     let total = across.as_u64vec3().element_product();
     // Chunks to a side of the boxes of which one is read.
     let groups = |side: u32| across.map(|count| count.div_ceil(side));
     let is_few = |side: &u32| groups(*side).as_u64vec3().element_product() <= MOST_CHUNKS;
-    let side = if step == 1 { 1 } else { (1..=across.max_element()).find(is_few).unwrap_or(1) };
+    let side =
+        if step == 1 || chunks == Chunks::All { 1 } else { (1..=across.max_element()).find(is_few).unwrap_or(1) };
     let groups = groups(side);
     let of_group = |at: u32| {
         let at = UVec3::new(at % groups.x, at / groups.x % groups.y, at / (groups.x * groups.y)) * side;

@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use glam::UVec3;
+use glam::{DVec3, UVec3};
 
 use super::adapted::{AdaptedStore, Tally};
 use super::labels::labels_of;
 use super::resample::{Oriented, is_same_grid};
-use super::sample::{parts_of, sample_at, spread};
+use super::sample::{Chunks, parts_of, sample_at, some, spread};
 use super::turned::with_turned;
 use super::{ChunkProgress, Grid, IndexedStore, Labels, Store, StoreIndex, Volume, VolumeError};
 use crate::StoreCounts;
@@ -24,6 +24,19 @@ pub struct StreamedVolume {
     pub sample: Arc<Volume>,
     /// The bytes that chunks may hold together; beyond them those are dropped, and read again, that no tile is drawn from.
     pub memory: u64,
+}
+
+/// A level of a volume, or every nth voxel of one along each axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Thinned {
+    /// The number of the level in the first channel's store.
+    pub level: usize,
+    /// n.
+    pub stride: u32,
+    /// The voxels along each axis that are left.
+    pub dims: UVec3,
+    /// Their distances, in world units.
+    pub spacing: DVec3,
 }
 
 /// A channel of a [`StreamedVolume`].
@@ -219,6 +232,30 @@ impl StreamedVolume {
         StoreCounts { sample_chunks_read: of_sample.chunks_read, sample_bytes_read: of_sample.bytes_read, ..counts }
     }
 
+    /// The finest level of at most `most` voxels that all channels and labels have; without one, every nth voxel of the coarsest, n the least power of 2 that
+    /// leaves no more.
+    #[doc(hidden)]
+    pub fn thinned(&self, most: u64) -> Thinned {
+        let common = common_levels((&self.first, &self.further));
+        let voxels = |grid: &Grid, stride: u32| grid.resized(grid.dims.map(|count| count.div_ceil(stride))).voxels();
+        // The level that is drawn is among them.
+        let chosen = common.iter().find(|(_, grid)| voxels(grid, 1) <= most).or(common.last());
+        let &(level, grid) = chosen.unwrap_or(&(self.level(), *self.grid()));
+        let stride = (0..u32::BITS).map(|power| 1 << power).find(|&stride| voxels(&grid, stride) <= most).unwrap_or(1);
+        let dims = grid.dims.map(|count| count.div_ceil(stride));
+        Thinned { level, stride, dims, spacing: grid.spacing * f64::from(stride) }
+    }
+
+    /// Reads all voxels of [`Self::thinned`], of all channels with their labels. All may be holes.
+    ///
+    /// # Errors
+    /// If a store cannot be read, or a value of labels is no label.
+    #[doc(hidden)]
+    pub fn read_thinned(&self, Thinned { level, stride, .. }: Thinned) -> Result<Volume, VolumeError> {
+        let grid = self.first.values.store.levels()[level].grid;
+        read_every((&self.first, &self.further), (&grid, stride), Chunks::All)
+    }
+
     /// The number of the first channel's level that is drawn.
     #[doc(hidden)]
     pub fn level(&self) -> usize {
@@ -277,17 +314,45 @@ pub fn sample_of_channels(
     memory: u64,
 ) -> Result<Volume, VolumeError> {
     check_grids((first, further))?;
-    let channels = || std::iter::once(first).chain(further);
-    let is_on_all = |grid: &Grid| channels().flat_map(StreamedChannel::levels).all(|of| of.level_on(grid).is_some());
-    // The levels that are drawn are among them.
-    let common: Vec<Grid> =
-        first.values.store.levels().iter().map(|level| level.grid).filter(|grid| is_on_all(grid)).collect();
-    let parts: u64 = channels().flat_map(StreamedChannel::levels).map(|of| parts_of(&*of.store)).sum();
-    let (number, step) = spread(&common, memory / parts);
+    let common = common_levels((first, further));
+    let parts: u64 =
+        channels_of((first, further)).flat_map(StreamedChannel::levels).map(|of| parts_of(&*of.store)).sum();
+    let grids: Vec<Grid> = common.iter().map(|&(_, grid)| grid).collect();
+    let (number, step) = spread(&grids, memory / parts);
+    read_every((first, further), (&common[number].1, step), Chunks::Few)
+}
+
+/// All channels.
+fn channels_of<'a>(
+    (first, further): (&'a StreamedChannel, &'a [StreamedChannel]),
+) -> impl Iterator<Item = &'a StreamedChannel> {
+    std::iter::once(first).chain(further)
+}
+
+/// The levels that all channels and labels have, from the finest: their numbers in the first channel's store, and their grids. The levels that are drawn are
+/// among them.
+fn common_levels((first, further): (&StreamedChannel, &[StreamedChannel])) -> Vec<(usize, Grid)> {
+    let is_on_all = |grid: &Grid| {
+        channels_of((first, further)).flat_map(StreamedChannel::levels).all(|of| of.level_on(grid).is_some())
+    };
+    let levels = first.values.store.levels().iter().map(|level| level.grid).enumerate();
+    levels.filter(|(_, grid)| is_on_all(grid)).collect()
+}
+
+/// Every nth voxel of a level along each axis, given by its grid, of all channels and labels.
+///
+/// # Errors
+/// If a store cannot be read, or holds no finite value in chunks that stand for others, or a value of labels is no label.
+fn read_every(
+    (first, further): (&StreamedChannel, &[StreamedChannel]),
+    (grid, step): (&Grid, u32),
+    chunks: Chunks,
+) -> Result<Volume, VolumeError> {
     let mut reads = StoreCounts::default();
     let mut read = |of: &StreamedLevel| -> Result<Volume, VolumeError> {
-        let level = of.level_on(&common[number]).unwrap_or(of.level);
-        let sample = sample_at(&of.origin, &*of.store, (level, step))?;
+        let level = of.level_on(grid).unwrap_or(of.level);
+        let sample = sample_at(&of.origin, &*of.store, (level, step), chunks)?;
+        let sample = if chunks == Chunks::Few { some(&of.origin, sample)? } else { sample };
         let own = sample.reads().unwrap_or_default();
         reads = StoreCounts {
             chunks_total: reads.chunks_total + own.chunks_total,
@@ -305,7 +370,7 @@ pub fn sample_of_channels(
             origin: labels.origin.clone(),
             dims: own.dims(),
             spacing: None,
-            values: labels_of(&labels.origin, (&common[number], UVec3::ZERO, own.dims(), step), own.values().iter())?,
+            values: labels_of(&labels.origin, (grid, UVec3::ZERO, own.dims(), step), own.values().iter())?,
             names: labels.store.facts().label_names,
         })
     };

@@ -9,7 +9,7 @@ use super::frame::Frame;
 use super::planes::{Plane, Points};
 use crate::cpu::count::bits;
 use crate::cpu::vector::LANES;
-use crate::light::{Left, Lights};
+use crate::light::{Left, LightStack, Lights};
 
 impl Frame<'_> {
     /// A and S of some of eight pixels at a share of the way between a slab's planes; 1 of others.
@@ -69,9 +69,9 @@ fn look_up(
     let (first, last) = (near.of(column, row), far.of(column, row));
     let (way, turn) = (last - first, far.right - near.right);
     for (left, stack) in left.iter_mut().zip([&lights.occlusion, &lights.shadow]) {
-        let Some((amount, sheets)) = stack else { continue };
+        let Some(LightStack { amount, sheets, rows }) = stack else { continue };
         let mut places = [[0.0; LANES]; 3];
-        for (places, row) in places.iter_mut().zip(sheets.rows()) {
+        for (places, row) in places.iter_mut().zip(rows) {
             let of = |vector: DVec4| row.dot(vector) as f32;
             let (start, right) = (of(first.extend(1.0)), of(near.right.extend(0.0)));
             let (along, turned) = (of(way.extend(0.0)), of(turn.extend(0.0)));

@@ -22,6 +22,7 @@ use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::kernel::Kernel;
+use crate::light::{KeptLight, StreamedLight};
 use crate::lists::iso_range::ValueSet;
 use crate::parallel::{ThreadPool, ThreadPoolBuilder, current_num_threads};
 use crate::part::{self, Content, Part};
@@ -29,7 +30,6 @@ use crate::rendering::Rendering;
 use crate::scene::Scene;
 use crate::scene::open::CHUNKS_OF_THREAD;
 use crate::settings::camera::Camera;
-use crate::settings::shading::STREAMED_LIGHT;
 use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
@@ -58,6 +58,9 @@ pub struct StreamRenderer {
     sampled: Option<[f32; 2]>,
     simd: Simd,
     level: Level,
+    light: StreamedLight,
+    /// Light that is made elsewhere.
+    given: Option<KeptLight>,
 }
 
 impl StreamRenderer {
@@ -86,7 +89,13 @@ impl StreamRenderer {
         let (simd, level) = simd::chosen()?;
         let (scene, transfer) = settled(&volume, scene)?;
         let sampled = range_of(volume.sample.values().iter());
-        Ok(Self { volume, values, scene, transfer, sampled, simd, level })
+        let (light, given) = (StreamedLight::default(), None);
+        Ok(Self { volume, values, scene, transfer, sampled, simd, level, light, given })
+    }
+
+    /// Draws in light that is made elsewhere.
+    pub(crate) fn set_light(&mut self, light: KeptLight) {
+        self.given = Some(light);
     }
 
     /// The volume that is drawn.
@@ -165,7 +174,12 @@ impl StreamRenderer {
         let (size, grid) = (view.size, *self.volume.grid());
         let threads = self.threads();
         let stream = Arc::new(self.stream((scene, view), &window)?);
-        let host = Host { window, is_part, first_hit: None, surfaces: None, lights: None };
+        let lights = match self.given.clone() {
+            Some(mut given) => given.lights((&self.volume.sample, &self.transfer), scene, &scene.camera)?,
+            None => self.light.lights((&self.volume, &self.transfer), scene)?,
+        };
+        let lights = lights.map(|lights| Arc::new(lights.on(&grid)));
+        let host = Host { window, is_part, first_hit: None, surfaces: None, lights };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
             Classification::After => {
                 let nothing = Volume::piece(grid.resized(UVec3::ZERO), Values::default());
@@ -191,7 +205,8 @@ impl StreamRenderer {
         read.bytes_read = bytes;
         read.chunk_bytes = most_held;
         let store = self.volume.with_sample(read);
-        Ok((content, Stats { store: Some(store), ..statistics(self.simd, size, counts, start) }))
+        let stats = Stats { store: Some(store), ..statistics(self.simd, size, counts, start) };
+        Ok((content, self.light.noted_in(&self.volume, stats)))
     }
 
     /// The number of threads that draw: as many as there are, or as memory holds the chunks of.
@@ -279,7 +294,7 @@ fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFun
     scene.check_volume(sample)?;
     check(scene)?;
     scene.check_streamed(volume)?;
-    scene.shading.refuse_light(STREAMED_LIGHT[0], STREAMED_LIGHT[1])?;
+    StreamedLight::check(volume, scene)?;
     let settled = scene.settled(sample);
     let transfer = settled.resolve(sample);
     Ok((Scene { splatting: settled.splatting.streamed(), ..settled }, transfer))

@@ -20,17 +20,18 @@ use std::ops::Range;
 
 use web_time::Instant;
 
+use super::given_light::GivenLight;
 use super::timed::milliseconds_since;
 use super::{Headless, joined};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
+use crate::light::StreamedLight;
 use crate::part::{self, Content, Extreme, Identity, MergeError, Part};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
-use crate::settings::shading::STREAMED_LIGHT;
 use crate::settings::splatting::{Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
@@ -46,6 +47,9 @@ pub(super) struct BoxedView {
     scene: Scene,
     /// What draws the boxes.
     backend: Backend,
+    light: StreamedLight,
+    /// Light that is made elsewhere.
+    given: Option<GivenLight>,
 }
 
 impl BoxedView {
@@ -55,11 +59,16 @@ impl BoxedView {
         check(&volume, scene, backend)?;
         let mut scene = scene.settled(&volume.sample);
         scene.splatting = scene.splatting.streamed();
-        Ok(Self { volume, scene, backend })
+        Ok(Self { volume, scene, backend, light: StreamedLight::default(), given: None })
     }
 
     pub(super) fn backend(&self) -> Backend {
         self.backend
+    }
+
+    /// Draws in light that is made elsewhere.
+    pub(super) fn set_light(&mut self, light: GivenLight) {
+        self.given = Some(light);
     }
 
     pub(super) fn volume(&self) -> &StreamedVolume {
@@ -105,7 +114,7 @@ impl BoxedView {
 
     /// The parts of a window, one for each region.
     fn parts(&self, window: &Window, headless: &Headless) -> Result<(Vec<Part>, Stats), RenderError> {
-        let Self { volume, scene, backend } = self;
+        let Self { volume, scene, backend, .. } = self;
         part::check(&volume.sample, scene, window)?;
         let scene = scene.explicit(&volume.sample);
         let view =
@@ -114,6 +123,10 @@ impl BoxedView {
             identity: Identity::of((&volume.clone().into(), &scene), &view)?,
             slabs: window.within(&view.slabs_of(volume.grid())),
             source: Source::new(headless, volume, &scene, &view)?,
+            light: match &self.given {
+                Some(given) => Some(given.clone()),
+                None => GivenLight::of_streamed(&self.light, (volume, &scene), *backend)?,
+            },
             scene,
             headless,
             range: volume.first.values.range().or_else(|| range_of(volume.sample.values().iter())).unwrap_or([0.0; 2]),
@@ -129,7 +142,8 @@ impl BoxedView {
         let [width, height] = view.size;
         // Nothing may have been drawn.
         let backend = backend.name().to_owned();
-        Ok((parts, Stats { store: Some(store), counts, width, height, backend, ..stats }))
+        let stats = Stats { store: Some(store), counts, width, height, backend, ..stats };
+        Ok((parts, self.light.noted_in(volume, stats)))
     }
 }
 
@@ -140,6 +154,8 @@ struct Walk<'a> {
     /// The slabs that are drawn.
     slabs: Range<i32>,
     source: Source<'a>,
+    /// The light of the whole volume.
+    light: Option<GivenLight>,
     /// What draws the boxes.
     headless: &'a Headless,
     /// The minimum and maximum of the first channel's values, or of its sample's; there is no other channel where pixels choose values.
@@ -211,7 +227,7 @@ impl Walk<'_> {
         closed: Option<&[bool]>,
     ) -> Result<Option<Content>, RenderError> {
         let Some((mut content, stats, range)) =
-            self.source.draw(self.headless, needed, (&self.scene, window), closed)?
+            self.source.draw(self.headless, needed, (&self.scene, self.light.as_ref()), (window, closed))?
         else {
             return Ok(None);
         };
@@ -272,7 +288,7 @@ fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(),
     check_grids((&volume.first, &volume.further))?;
     scene.check_volume(&volume.sample)?;
     scene.check_streamed(volume)?;
-    scene.shading.refuse_light(STREAMED_LIGHT[0], STREAMED_LIGHT[1])?;
+    StreamedLight::check(volume, scene)?;
     #[cfg(feature = "cpu")]
     if backend == Backend::Cpu {
         crate::cpu::check(scene)?;

@@ -20,6 +20,7 @@ use crate::geometry::plane_geometry::PlaneGeometry;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::gpu::gpu_volume::GpuVolume;
 use crate::gpu::shown_bricks::{BrickNeeds, shown_lists};
+use crate::headless::given_light::GivenLight;
 use crate::headless::gpu::GpuHeadless;
 use crate::lists::brick::{self, Brick, BrickList, SIDE};
 use crate::lists::classify::brick_list;
@@ -420,8 +421,8 @@ impl<'a> Pages<'a> {
     pub(super) fn draw(
         &mut self,
         Paging { drawn, pages, within: (low, across) }: Paging,
-        window: &Window,
-        closed: Option<&[bool]>,
+        (window, closed): (&Window, Option<&[bool]>),
+        light: Option<&GivenLight>,
     ) -> Result<(Content, Stats), RenderError> {
         while !self.hold(&pages)? {}
         let from = low << self.division.bits;
@@ -434,9 +435,8 @@ impl<'a> Pages<'a> {
         let lists = (0..self.list_count()).map(|list| {
             // A page lies partly in other windows, or behind closed pixels.
             let bricks: Vec<&Brick> = known().flat_map(|(block, number)| &block.pages[number].lists[list]).collect();
-            let seen = bricks
-                .into_par_iter()
-                .filter(|brick| self.first_slab(brick::bounds(brick), &open, &window.slabs).is_some());
+            let is_seen = |brick: &&Brick| self.first_slab(brick::bounds(brick), &open, &window.slabs).is_some();
+            let seen = bricks.into_par_iter().filter(is_seen);
             let moved =
                 |brick: &Brick| Brick { x: brick.x - from.x, y: brick.y - from.y, z: brick.z - from.z, ..*brick };
             BrickList::of_bricks(&grid, seen.map(moved).collect())
@@ -450,7 +450,7 @@ impl<'a> Pages<'a> {
         let volume = GpuVolume::paged(self.pool.device(), Volume::hollow(grid, &hollow), paged);
         let ahead = std::mem::take(&mut self.ahead);
         let of_thread = &*self;
-        let draw = || of_thread.gpu.draw_pages(&volume, &of_thread.scene, window, closed);
+        let draw = || of_thread.gpu.draw_pages(&volume, &of_thread.scene, (window, closed), light);
         let (drawn, read) = join(draw, || of_thread.read_all(ahead.into_iter().map(|block| (block, ALL)).collect()));
         self.forget();
         self.take(read?)?;

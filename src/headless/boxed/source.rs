@@ -11,6 +11,7 @@ use super::pages::{Pages, Paging};
 use crate::error::RenderError;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::headless::Headless;
+use crate::headless::given_light::GivenLight;
 use crate::part::Content;
 use crate::scene::Scene;
 use crate::settings::Gradient;
@@ -139,8 +140,8 @@ impl<'a> Source<'a> {
         &mut self,
         headless: &Headless,
         needed: Needed,
-        (scene, window): (&Scene, &Window),
-        closed: Option<&[bool]>,
+        (scene, light): (&Scene, Option<&GivenLight>),
+        (window, closed): (&Window, Option<&[bool]>),
     ) -> Result<Option<Drawn>, RenderError> {
         match (self, needed) {
             (Self::Boxes(chunks), Needed::Box(within)) => {
@@ -152,12 +153,12 @@ impl<'a> Source<'a> {
                 if scene.shading.gradient == Gradient::Membership && !has_labels {
                     scene.shading.gradient = Gradient::Differences;
                 }
-                let (content, stats) = headless.draw_box(volume, &scene, window, closed)?;
+                let (content, stats) = headless.draw_box(volume, &scene, (window, closed), light)?;
                 Ok(Some((content, stats, range)))
             }
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
             (Self::Pages(pages), Needed::Pages(paging)) => {
-                let (content, stats) = pages.draw(paging, window, closed)?;
+                let (content, stats) = pages.draw(paging, (window, closed), light)?;
                 Ok(Some((content, stats, None)))
             }
             #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]

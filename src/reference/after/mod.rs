@@ -104,12 +104,12 @@ fn composite_window(
 pub(super) fn nearest_part(
     volume: &Volume,
     transfer: &TransferFunction,
-    scene: &Scene,
+    (scene, lights): (&Scene, Option<&Arc<Lights>>),
     window: &Window,
 ) -> Result<Content, RenderError> {
     // All channels share a camera.
     let scene = scene.framed(volume, transfer);
-    let lights = Arc::new(Lights::new(volume, transfer, &scene)?);
+    let lights = Lights::or_new(lights, volume, transfer, &scene)?;
     let host = Host { first_hit: Some(1.0), ..Host::default() };
     let (mut colors, mut hits) = (vec![[0.0; 4]; window.region.pixels()], vec![f64::INFINITY; window.region.pixels()]);
     for (number, channel) in volume.channels().enumerate().take(1 + transfer.further.len()) {
@@ -126,10 +126,10 @@ pub(super) fn nearest_part(
 pub(super) fn part(
     volume: &Volume,
     transfer: &TransferFunction,
-    scene: &Scene,
+    (scene, lights): (&Scene, Option<&Arc<Lights>>),
     window: &Window,
 ) -> Result<Content, RenderError> {
-    let pixels = composite_window(Host::default(), (volume, transfer), (scene, None), window)?;
+    let pixels = composite_window(Host::default(), (volume, transfer), (scene, lights), window)?;
     let compositing = scene.splatting.compositing;
     let is_mean = |pixel: &Composited| compositing == Compositing::Average && pixel.extreme.counted > Extreme::MIDDLE;
     // Means are classified where parts are merged.

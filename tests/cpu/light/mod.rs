@@ -3,6 +3,7 @@
 
 mod pictures;
 mod sheets;
+mod streams;
 mod twin;
 
 use std::sync::Arc;

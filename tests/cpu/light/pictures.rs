@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, UVec3};
+use glam::DVec3;
 use sheetsplat::Scene;
-use sheetsplat::cpu::{CpuRenderer, Simd, StreamRenderer};
+use sheetsplat::cpu::{CpuRenderer, Simd};
 use sheetsplat::image::Image;
 use sheetsplat::internals::reference;
 use sheetsplat::scene::{Channel, VolumeSource};
@@ -13,7 +13,6 @@ use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{bits, largest_difference, rms};
-use crate::common::store::{MemoryStore, streamed};
 use crate::common::{COMPOSITINGS, SPACINGS, lit_by_sheets, scene, transfer};
 use crate::light::on_threads;
 use crate::native::{draw, head, psnr, shown};
@@ -174,20 +173,6 @@ fn light_does_not_depend_on_slab_widths() {
         let (narrow, wide) = (mean_light(0.5), mean_light(2.0));
         println!("{classification:?}: {narrow:.4} of the light at 0.5, {wide:.4} at 2");
         assert!(narrow < 0.9 && (narrow - wide).abs() < 0.01, "{classification:?}: {narrow} {wide}");
-    }
-}
-
-/// Ways of drawing that do not know the whole volume's light refuse it by its key.
-#[test]
-fn streams_refuse_light_by_name() {
-    for (occlusion, key) in [(0.8, "shading.occlusion"), (0.0, "shading.shadow")] {
-        let (volume, mut scene) = lit(Classification::Before);
-        scene.shading.occlusion = occlusion;
-        let volume = Volume::new("head", volume.dims(), volume.spacing(), volume.values().to_vec()).unwrap();
-        let store = Arc::new(MemoryStore::new(&volume, UVec3::splat(8)));
-        let streamed = streamed(store, 0, &volume, 1 << 30);
-        let error = StreamRenderer::new(streamed, &scene).unwrap_err().to_string();
-        assert!(error.starts_with(key) && error.contains("streamed"), "{error}");
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use sheetsplat::Scene;
-use sheetsplat::internals::light::{KeptLight, LightSheets};
+use sheetsplat::internals::light::{KeptLight, LightSheets, LightStack};
 use sheetsplat::internals::reference::light;
 use sheetsplat::settings::{Light, Ramp, Shading};
 use sheetsplat::volume::Volume;
@@ -78,16 +78,16 @@ fn stacks_are_those_of_the_f64_evaluation() {
         let stacks = [(&found.occlusion, -basis.w, occlusion_spread), (&found.shadow, to_light, shadow_spread)];
         for (stack, to_light, spread) in stacks {
             let expected = light::LightSheets::new((&volume, &transfer), &scene, to_light, spread).unwrap();
-            let (_, sheets) = stack.as_ref().unwrap();
-            let apart = apart(sheets, &expected);
+            let light = stack.as_ref().unwrap();
+            let apart = apart(&light.sheets, &expected);
             worst = worst.max(apart);
-            dark += u32::from(sheets.light.iter().any(|&light| light < 0.9));
+            dark += u32::from(light.sheets.light.iter().any(|&light| light < 0.9));
             assert_at_most(apart, 2e-3, format_args!("{number}: {:?}", scene.shading));
             for _ in 0..200 {
                 let end = volume.dims().as_dvec3() + 1.0;
                 let voxel = random.within(-2.0 * DVec3::ONE, end);
                 let exact = expected.at(in_units(&volume, voxel));
-                assert_at_most((f64::from(sheets.at(voxel)) - exact).abs(), 2e-3, format_args!("{number} at {voxel}"));
+                assert_at_most((f64::from(light.at(voxel)) - exact).abs(), 2e-3, format_args!("{number} at {voxel}"));
             }
         }
     }
@@ -102,8 +102,8 @@ fn stacks_have_the_same_bytes_on_any_number_of_threads() {
         let (volume, scene) = case(&mut random);
         let bits = |threads: usize| {
             let found = on_threads(threads, || lights(&volume, &scene));
-            let bits = |stack: &Option<(f32, Arc<LightSheets>)>| {
-                stack.as_ref().unwrap().1.light.iter().map(|light| light.to_bits()).collect::<Vec<_>>()
+            let bits = |stack: &Option<LightStack>| {
+                stack.as_ref().unwrap().sheets.light.iter().map(|light| light.to_bits()).collect::<Vec<_>>()
             };
             [bits(&found.occlusion), bits(&found.shadow)]
         };
@@ -120,7 +120,7 @@ fn stacks_are_kept_while_nothing_that_they_depend_on_changes() {
     let mut stacks = |scene: &Scene| {
         let transfer = scene.transfer.resolve(&volume);
         let lights = kept.lights((&volume, &transfer), scene, &scene.camera).unwrap().unwrap();
-        [&lights.occlusion, &lights.shadow].map(|stack| Arc::clone(&stack.as_ref().unwrap().1))
+        [&lights.occlusion, &lights.shadow].map(|stack| Arc::clone(&stack.as_ref().unwrap().sheets))
     };
     let [occlusion, shadow] = stacks(&scene);
     scene.shading.ambient = 0.7;
