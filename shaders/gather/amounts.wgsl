@@ -53,7 +53,8 @@ struct Shaded {
 fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
     var channels = ChannelSum();
     var alpha = 0.0;
-    for (var channel = zero; channel < CHANNELS; channel += 1u) {
+    // One place for all channels, because much is compiled into it.
+    for (var channel = select(zero, 0u, CHANNELS == 1u); channel < CHANNELS; channel += 1u) {
         read_channel(channel);
         let own = shaded_in(channel, voxel, p);
         channels = with_channel(channels, own.amount);

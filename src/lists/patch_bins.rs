@@ -34,11 +34,11 @@ const MAX_BRICKS: usize = 1 << 26;
 /// The maximum number of passes through loops that a thread takes in one dispatch: llvmpipe ends a thread's loops after 65 535 passes. Every
 /// loop costs one extra pass for its exit check, and so do the loops nested in it. Threads count their passes and continue in the next
 /// dispatch. The difference is left for the work before the first group, which examines every pixel's ray, and after the last.
-const MAX_PASSES: u32 = 64900;
+const MAX_PASSES: u32 = 63000;
 
 /// The maximum number of passes of a group without its bricks, and the additional passes per block, for subgroups of 8 threads.
 const MAX_PASSES_OF_GROUP: u32 = 60;
-const MAX_PASSES_OF_BLOCK: u32 = 40;
+const MAX_PASSES_OF_BLOCK: u32 = 46;
 
 /// The maximum number of passes of a brick, for subgroups of 8 threads: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them,
 /// 8 to keep them, and 10 where the queue is full.
@@ -48,7 +48,7 @@ const MAX_PASSES_OF_BRICK: u32 = 158;
 const MAX_PASSES_OF_BRICK_OF_VALUES: u32 = MAX_PASSES_OF_BRICK - 40;
 
 /// The number of passes that classify and composite four slabs of a block.
-const MAX_PASSES_OF_SLABS: u32 = 200;
+const MAX_PASSES_OF_SLABS: u32 = 264;
 
 /// The number of passes that add the sheets of these slabs to those of other layers.
 const MAX_PASSES_OF_SUMS: u32 = 64;
@@ -63,7 +63,7 @@ const MAX_PASSES_OF_ADDITION: u32 = 56;
 const SHADED_PER_BRICK: u32 = 8;
 
 /// The number of passes that determine how a block's rays are cut, or over which stretch means count, if needed.
-const MAX_PASSES_OF_LOOK: u32 = 140;
+const MAX_PASSES_OF_LOOK: u32 = 160;
 
 /// The maximum number of passes through loops per thread, and the maxima for each kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
