@@ -97,9 +97,12 @@ fn add_sections(sheets: ptr<function, Sheets>, pixels: Pixels, blocks: u32) -> b
     return is_added;
 }
 
+// Passes to composite a group's sheets.
+const PASSES_PER_SHEETS = 6u;
+
 // Composites a thread's complete sheets into its pixels.
 fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Progress>) {
-    passes += select(0u, PASSES_PER_LOOK, CUT || is_by_means());
+    passes += PASSES_PER_SHEETS + select(0u, PASSES_PER_LOOK, CUT || is_by_means());
     find_stretches(pixels.column, pixels.rows);
     if FIRST_HIT {
         load_hits(pixels);

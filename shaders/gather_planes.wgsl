@@ -178,7 +178,7 @@ fn composite_pixels(pixels: Pixels, sheets: Sheets, progress: ptr<function, Prog
 const PASSES_PER_LOAD = 2u;
 
 // Passes to classify, shade and composite four slabs at four pixels.
-const PASSES_PER_SLABS = 264u;
+const PASSES_PER_SLABS = 200u;
 
 // Passes to add their sheets to those of other layers.
 const PASSES_PER_SUMS = 64u;

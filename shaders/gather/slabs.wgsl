@@ -90,8 +90,8 @@ fn carried_pixels() -> u32 {
 fn find_handed_on(pixels: Pixels) {
     passes += 6u * CHANNELS + 1u;
     var is_any = false;
-    for (var layer = zero; layer < CHANNELS; layer += 1u) {
-        for (var i = zero; i < 4u; i += 1u) {
+    for (var layer = 0u; layer < CHANNELS; layer += 1u) {
+        for (var i = 0u; i < 4u; i += 1u) {
             let held = carried[layer * carried_pixels() + carried_slot(pixels, i)] ^ NOTHING_CARRIED;
             is_any = is_any || (pixels.is_inside[i] && bitcast<f32>(held.x) != NO_NUMBER);
         }
@@ -108,7 +108,7 @@ fn note_handed_on(pixels: Pixels, is_any: bool) {
 fn without_holes(fields: Fields, pixels: Pixels, sheet_depth: f32) -> Fields {
     var result = fields;
     if HOLES {
-        for (var i = zero; i < 4u; i += 1u) {
+        for (var i = 0u; i < 4u; i += 1u) {
             let place = voxel_at(place_of(vec2f(pixels.column, pixels.rows[i])), sheet_depth);
             result.has_value[i] = result.has_value[i] && !is_hole(stored_at(index_of(nearest_voxel(place))));
         }
@@ -186,7 +186,7 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
     var result = transpose(image);
     var held: Records;
     var held_colors: mat4x4f;
-    for (var i = zero; i < 4u; i += 1u) {
+    for (var i = 0u; i < 4u; i += 1u) {
         held = with_record(held, i, carried_by(carried_slot(pixels, i), carried_pixels()));
         held_colors = with_color(held_colors, i, carried_color(carried_slot(pixels, i), carried_pixels()));
     }
@@ -194,13 +194,13 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
     // Bits of slabs, the four pixels of one after those of the other.
     var shown = 0u;
     var is_handed_on = false;
-    for (var j = zero; j < SHEETS; j += 1u) {
+    for (var j = 0u; j < SHEETS; j += 1u) {
         let near = sheet_group.near + f32(j) * frame.slab_width;
         let far = near + frame.slab_width;
         let sums = sums_on(sheets, j);
         let fields = without_holes(fields_of(sums), pixels, far);
         let plane_colors = colors_of(sums, fields.has_value);
-        for (var i = zero; i < 4u; i += 1u) {
+        for (var i = 0u; i < 4u; i += 1u) {
             let at = 4u * j + i;
             let drawn = sample_of(fields, i);
             let before = sample_before(points, at);
@@ -270,7 +270,7 @@ fn composite_slabs(image: mat4x4f, sheets: Sheets, pixels: Pixels) -> mat4x4f {
     }
     passes += largest(count) * gather.search_passes;
 
-    for (var i = zero; i < 4u; i += 1u) {
+    for (var i = 0u; i < 4u; i += 1u) {
         let last = 4u * (SHEETS - 1u) + i;
         let record = with_sample(record_at(held, i), saved[sample_slot(last, pixels.thread)]);
         if pixels.is_inside[i] {

@@ -69,12 +69,12 @@ const PASSES_PER_GROUP = 6u;
 const PASSES_PER_FILL = 36u;
 const PASSES_PER_FIND = 5u;
 const PASSES_PER_SHADING = 7u;
-const PASSES_PER_ROUND = 24u;
+const PASSES_PER_ROUND = 18u;
 const PASSES_PER_BATCH = 4u;
 const PASSES_PER_ADDITION = 2u;
 
 // The passes that determine how four rays are cut, or over which stretch means count.
-const PASSES_PER_LOOK = 160u;
+const PASSES_PER_LOOK = 140u;
 
 // The progress in a patch: a mask of its pixels that stay open after the group, and a mask of halves of blocks whose sheets are not empty.
 struct Progress {

@@ -34,11 +34,11 @@ const MAX_BRICKS: usize = 1 << 26;
 /// The maximum number of passes through loops that a thread takes in one dispatch: llvmpipe ends a thread's loops after 65 535 passes. Every
 /// loop costs one extra pass for its exit check, and so do the loops nested in it. Threads count their passes and continue in the next
 /// dispatch. The difference is left for the work before the first group, which examines every pixel's ray, and after the last.
-const MAX_PASSES: u32 = 63000;
+const MAX_PASSES: u32 = 64900;
 
 /// The maximum number of passes of a group without its bricks, and the additional passes per block, for subgroups of 8 threads.
 const MAX_PASSES_OF_GROUP: u32 = 60;
-const MAX_PASSES_OF_BLOCK: u32 = 46;
+const MAX_PASSES_OF_BLOCK: u32 = 40;
 
 /// The maximum number of passes of a brick, for subgroups of 8 threads: 8 to fetch and visit it, 76 to find its voxels, 56 to shade them,
 /// 8 to keep them, and 10 where the queue is full.
@@ -48,7 +48,10 @@ const MAX_PASSES_OF_BRICK: u32 = 158;
 const MAX_PASSES_OF_BRICK_OF_VALUES: u32 = MAX_PASSES_OF_BRICK - 40;
 
 /// The number of passes that classify and composite four slabs of a block.
-const MAX_PASSES_OF_SLABS: u32 = 264;
+const MAX_PASSES_OF_SLABS: u32 = 200;
+
+/// The number of passes that composite four sheets of a block.
+const MAX_PASSES_OF_SHEETS: u32 = 6;
 
 /// The number of passes that add the sheets of these slabs to those of other layers.
 const MAX_PASSES_OF_SUMS: u32 = 64;
@@ -63,7 +66,7 @@ const MAX_PASSES_OF_ADDITION: u32 = 56;
 const SHADED_PER_BRICK: u32 = 8;
 
 /// The number of passes that determine how a block's rays are cut, or over which stretch means count, if needed.
-const MAX_PASSES_OF_LOOK: u32 = 160;
+const MAX_PASSES_OF_LOOK: u32 = 140;
 
 /// The maximum number of passes through loops per thread, and the maxima for each kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -87,17 +90,19 @@ pub struct Work {
     pub threads: u32,
     /// The number of layers in which values are gathered; 1 where colours are.
     pub layers: u32,
+    /// Whether rays are cut, or means of their sheets count: then all of a patch's rays are looked at before the first group.
+    pub looks: bool,
 }
 
 impl Passes {
     /// The passes of a view in which a workgroup draws `blocks` blocks of a patch; `values` states whether values are gathered.
-    pub fn new(Work { search, threads, layers }: Work, blocks: u32, values: bool) -> Self {
+    pub fn new(Work { search, threads, layers, looks }: Work, blocks: u32, values: bool) -> Self {
         let (of_voxels, of_slabs) = match values {
             true => (
                 MAX_PASSES_OF_BRICK_OF_VALUES,
                 MAX_PASSES_OF_SLABS.saturating_add(SLABS_OF_THREAD.saturating_mul(search)),
             ),
-            false => (MAX_PASSES_OF_BRICK + SHADED_PER_BRICK * search, 0),
+            false => (MAX_PASSES_OF_BRICK + SHADED_PER_BRICK * search, MAX_PASSES_OF_SHEETS),
         };
         let of_slabs = of_slabs.saturating_add(if layers > 1 { MAX_PASSES_OF_SUMS } else { 0 });
         let of_block = of_slabs.saturating_add(MAX_PASSES_OF_BLOCK + MAX_PASSES_OF_LOOK);
@@ -108,7 +113,8 @@ impl Passes {
         // Half as many threads take twice as many passes.
         let times = 8_u32.div_ceil(threads);
         let of_all = |passes: u32| passes.saturating_mul(times);
-        Self { most: MAX_PASSES, per_group: of_all(per_group), per_brick: of_all(per_brick), search }
+        let most = MAX_PASSES - if looks { of_all(blocks * MAX_PASSES_OF_LOOK) } else { 0 };
+        Self { most, per_group: of_all(per_group), per_brick: of_all(per_brick), search }
     }
 }
 

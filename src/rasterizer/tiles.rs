@@ -400,7 +400,8 @@ fn bins(limits: &Limits, request: &FrameRequest, bricks: &[Brick], search: u32) 
     let planes = after.as_ref().map(|after| &after.planes);
     let most_words = binding(limits) / 4;
     let (order, support) = (drawn_order(splatting), splatting.drawn_radius(kernel));
-    let work = Work { search, threads: request.least_lanes, layers: layer_count(request) };
+    let looks = request.rays.cut || splatting.compositing.is_by_means();
+    let work = Work { search, threads: request.least_lanes, layers: layer_count(request), looks };
     let of_groups = (covered.clone(), &drawn(request));
     Ok(PatchBins::new(bricks, (view, planes), order, of_groups, support, work, most_words)?)
 }

@@ -65,7 +65,7 @@ impl Case {
             splatting.order,
             (0.0..0.0, drawn),
             self.kernel().support(),
-            Work { search: 0, threads: 8, layers: 1 },
+            Work { search: 0, threads: 8, layers: 1, looks: true },
             most_words,
         )
     }

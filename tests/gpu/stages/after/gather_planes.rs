@@ -61,7 +61,7 @@ fn gathered(prepared: &Prepared<'_>, stage: &Gather, first_hit: Option<f64>, ban
         Order::FrontToBack,
         (covered, &Window::whole([1; 2]).slabs),
         kernel.support(),
-        Work { search: search(prepared), threads: 8, layers: 1 },
+        Work { search: search(prepared), threads: 8, layers: 1, looks: true },
         u64::MAX,
     )
     .unwrap();

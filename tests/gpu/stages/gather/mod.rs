@@ -63,7 +63,7 @@ impl<'a> Fixture<'a> {
             splatting.order,
             (covered, &Window::whole([1; 2]).slabs),
             kernel.support(),
-            Work { search: 0, threads: 8, layers: 1 },
+            Work { search: 0, threads: 8, layers: 1, looks: true },
             u64::MAX,
         )
         .unwrap()
