@@ -51,45 +51,63 @@ struct Shaded {
 
 // The sums over all channels (SPEC §10), in which a voxel's footprint is the same.
 fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
-    var channels = ChannelSum();
-    var alpha = 0.0;
-    // One place for all channels, because much is compiled into it.
-    for (var channel = select(zero, 0u, CHANNELS == 1u); channel < CHANNELS; channel += 1u) {
+    read_channel(0u);
+    let first = shaded_first(voxel, p);
+    var channels = with_channel(ChannelSum(), first.amount);
+    var alpha = first.alpha;
+    for (var channel = 1u; channel < CHANNELS; channel += 1u) {
         read_channel(channel);
-        let own = shaded_in(channel, voxel, p);
-        channels = with_channel(channels, own.amount);
-        alpha += own.alpha;
+        let further = shaded_further(voxel, channel, p);
+        channels = with_channel(channels, further.amount);
+        alpha += further.alpha;
     }
     return Shaded(total(channels), alpha);
 }
 
-// In one channel.
-fn shaded_in(channel: u32, voxel: vec3u, p: vec4f) -> Shaded {
+// In a channel after the first.
+fn shaded_further(voxel: vec3u, channel: u32, p: vec4f) -> Shaded {
+    let index = index_of(voxel);
+    let ramps = ramps_of(channel, index);
+    let stored = stored_at(index);
+    let value = value_of(stored);
+    let gradient = gradient_at(voxel);
+    let own = own_color(channel, index, ramp(ramps.x, ramps.y, value));
+    let alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
+    return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, voxel, p);
+}
+
+fn of_opacity(color: vec3f, alpha: f32, gradient: Gradient, voxel: vec3u, p: vec4f) -> Shaded {
+    let m = amount(alpha);
+    return Shaded(vec4f(shade(color, gradient, voxel_lighting(voxel, p.xy, PERSPECTIVE), vec3f(voxel)) * m, m), alpha);
+}
+
+// In the first channel.
+fn shaded_first(voxel: vec3u, p: vec4f) -> Shaded {
     let index = index_of(voxel);
     let stored = stored_at(index);
     let value = value_of(stored);
     let gradient = gradient_at(voxel);
-    let ramps = ramps_of(channel, index);
+    var ramps = vec4u(0u, frame.ramps.xyz);
     var color = vec3f(0.0);
     var alpha = 0.0;
-    // Lanes hold the first channel's ramps.
-    let is_held = !LABELS && channel == 0u;
-    for (var is_short = is_held; is_short; is_short = false) {
+    var is_searched = LABELS;
+    if LABELS {
+        ramps = ramps_of(0u, index);
+    } else {
         color = ramp_at(color_ramp, value);
+        alpha = ramp_at(opacity_ramp, value).x;
         // Without gradient opacity the ramp is a single point, which every lane holds.
         var by_gradient = gradient_opacity_ramp.own.y;
         for (var is_graded = ramps.w > ramps.z + 1u; is_graded; is_graded = false) {
             by_gradient = ramp_at(gradient_opacity_ramp, gradient.magnitude).x;
         }
-        alpha = ramp_at(opacity_ramp, value).x * by_gradient;
+        alpha *= by_gradient;
+        is_searched = is_long(color_ramp) || is_long(opacity_ramp) || is_long(gradient_opacity_ramp);
     }
-    let is_long = is_long(color_ramp) || is_long(opacity_ramp) || is_long(gradient_opacity_ramp);
-    for (var is_searched = !is_held || is_long; is_searched; is_searched = false) {
+    for (; is_searched; is_searched = false) {
         color = ramp(ramps.x, ramps.y, value);
         alpha = ramp(ramps.y, ramps.z, value).x * ramp(ramps.z, ramps.w, gradient.magnitude).x;
     }
-    let own = own_color(channel, index, color);
-    let opacity = select(alpha * own.a, 0.0, HOLES && is_hole(stored));
-    let shaded = shade(own.rgb, gradient, voxel_lighting(voxel, p.xy, PERSPECTIVE), vec3f(voxel));
-    return Shaded(vec4f(shaded, 1.0) * amount(opacity), opacity);
+    let own = own_color(0u, index, color);
+    return of_opacity(own.rgb, select(alpha * own.a, 0.0, HOLES && is_hole(stored)), gradient, voxel, p);
 }

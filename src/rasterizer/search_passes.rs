@@ -14,12 +14,8 @@ pub(super) fn of(request: &FrameRequest, by_label: bool) -> u32 {
     let channels = request.ramps.channels;
     let in_memory = by_label || channels > 1 || lengths.iter().any(|&points| points > request.least_lanes);
     let searches = 1 + lengths.iter().map(|&points| of_search(points)).sum::<u32>();
-    let of_loop = if channels > 1 { PASSES_OF_CHANNEL * (channels + 1) } else { 0 };
-    of_loop + if in_memory { channels * (1 + searches) } else { 0 }
+    if in_memory { channels * (1 + searches) } else { 0 }
 }
-
-/// The passes of the loops in which one of several channels is shaded, without any search.
-const PASSES_OF_CHANNEL: u32 = 10;
 
 /// The passes of the loops of a slab's second half, and those to find whether the slab shows anything, without any search.
 const PASSES_OF_HALVES: u32 = 16;
