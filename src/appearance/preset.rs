@@ -285,10 +285,11 @@ fn haze(volume: &Volume, opacity: impl Fn([f64; 2]) -> f64) -> TransferFunction 
 fn labels(volume: &Volume) -> Option<TransferFunction> {
     match volume.labels() {
         Some(labels) => {
-            let labels = categories::tables_of(volume, labels);
+            let labels = categories::tables(labels);
             Some(TransferFunction { labels, ..TransferFunction::from_histogram(volume) })
         }
-        None => categories::values(volume)
-            .map(|labels| categories::transfer_of(volume, &labels, volume.palette().unwrap_or_default())),
+        None => {
+            categories::values(volume).map(|labels| categories::transfer(&labels, volume.palette().unwrap_or_default()))
+        }
     }
 }

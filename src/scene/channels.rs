@@ -129,10 +129,7 @@ impl Scene {
             // The preset that declares values to be labels stays, because their looks may not tell.
             let preset =
                 settings.transfer.preset.filter(|preset| *preset == Preset::Labels && channel.labels().is_none());
-            let transfer = TransferSettings {
-                preset,
-                ..TransferSettings::stating(self.transfer_of(number, volume, channel), channel)
-            };
+            let transfer = TransferSettings { preset, ..self.transfer_of(number, volume, channel).into() };
             Channel { name, transfer, ..settings }
         };
         (0..).zip(volume.channels()).map(channel).collect()

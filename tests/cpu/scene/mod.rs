@@ -2,7 +2,6 @@
 
 mod classification;
 mod fitting;
-mod label_ids;
 mod refusals;
 
 use std::path::{Path, PathBuf};

@@ -18,7 +18,6 @@ mod holes;
 mod http;
 mod in_memory;
 mod label_grids;
-mod label_ids;
 mod limits;
 mod metaimage;
 mod mgh;
