@@ -60,7 +60,7 @@ var<private> counted_to: vec4f;
 
 // Determines the cuts and weights for the rays of a thread's four pixels, which are in one column.
 fn find_stretches(column: f32, rows: vec4f) {
-    // Begun at an unknown 0, loops stay loops: written out for four pixels they are half of what a driver has to compile.
+    // From `zero` on, so that drivers compile one pixel's cuts and not four.
     for (var i = zero; (CUT || is_by_means()) && i < 4u; i += 1u) {
         let here = PIXELS == vec4u(i);
         let point_px = vec2f(column, rows[i]);

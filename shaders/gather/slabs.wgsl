@@ -33,6 +33,7 @@ var<private> face_at: vec4f;
 
 // Finds the stretches of the rays of a thread's four pixels, which lie in one column.
 fn find_stretches(column: f32, rows: vec4f) {
+    // From `zero` on, so that drivers compile one pixel's cuts and not four.
     for (var i = zero; i < 4u; i += 1u) {
         let here = PIXELS == vec4u(i);
         let point_px = vec2f(column, rows[i]);

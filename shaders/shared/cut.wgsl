@@ -26,9 +26,6 @@ struct Cut {
 // A number beyond every depth.
 const FAR = 1e30;
 
-// The maximum number of planes.
-const MOST_PLANES = 12u;
-
 // The position on the image that identifies a ray.
 fn place_of(point_px: vec2f) -> vec3f {
     return vec3f(point_px - 0.5 * vec2f(frame.size), 1.0);

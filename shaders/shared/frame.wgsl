@@ -48,7 +48,8 @@ var<private> zero: u32;
 
 // The first step of every entry point, called with a 0 that no driver can prove to be 0, such as its workgroup's z. Lavapipe inserts the values of
 // uniforms that decide an `if` or end a loop into a stage, and compiles it again for each draw; values read at an unknown index are left
-// alone. Reading them here also reads them once: in a loop each read costs it a gather.
+// alone. Reading them here also reads them once: in a loop each read costs it a gather. Loops that begin at `zero` are not unrolled: drivers would compile
+// their bodies for every pass.
 fn start(unknown_zero: u32) {
     zero = unknown_zero;
     frame = frames[unknown_zero];

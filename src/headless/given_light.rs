@@ -44,7 +44,7 @@ impl GivenLight {
     }
 
     /// The light of all channels of a volume, for a scene with everything stated, with which a backend draws each of them by itself; `None` without occlusion,
-    /// shadow or shading. Statistics are noted by the function that comes with it.
+    /// shadow or shading. The second value adds this light to statistics.
     ///
     /// # Errors
     /// If a store cannot be read, or light needs more than can be computed.
@@ -119,7 +119,7 @@ impl GivenLight {
     }
 }
 
-/// What notes light in statistics.
+/// The light that a frame's statistics are to state, by where it comes from.
 pub(super) enum Noted {
     Nothing,
     Whole(Box<KeptLight>),

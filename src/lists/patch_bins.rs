@@ -33,7 +33,7 @@ const MAX_BRICKS: usize = 1 << 26;
 
 /// The maximum number of passes through loops that a thread takes in one dispatch: llvmpipe ends a thread's loops after 65 535 passes. Every
 /// loop costs one extra pass for its exit check, and so do the loops nested in it. Threads count their passes and continue in the next
-/// dispatch. The difference is left for the work before the first group, which examines every pixel's ray, and after the last.
+/// dispatch. The difference is left for the work before the first group and after the last; looks at rays before the first are counted by themselves.
 const MAX_PASSES: u32 = 64900;
 
 /// The maximum number of passes of a group without its bricks, and the additional passes per block, for subgroups of 8 threads.
