@@ -97,7 +97,7 @@ pub fn of_colors(volume: &Volume, kernel: (f64, f64)) -> Result<Option<Arc<[[f32
         let own = |(texel, value): (&Texel, f32)| {
             if value.is_nan() { f32::NAN } else { f32::from(texel[component]) / f32::from(u16::MAX) }
         };
-        let numbers: Vec<f32> = texels.par_iter().zip(volume.values().par_iter()).map(own).collect();
+        let numbers: Vec<f32> = texels.par_iter().zip(volume.values().par_iter()).map(own).numbers();
         let exact = solved(volume.grid(), (&numbers).into(), kernel, &|share| {
             let percent = 25.0 * (component as f64 + share);
             log::info!(target: PROGRESS, "coefficients of the voxels' colours: {percent:.0} %");
@@ -163,11 +163,8 @@ pub fn exact(
         })?
     };
     progress(1.0);
-    Ok(moved
-        .into_par_iter()
-        .zip(values.par_iter())
-        .map(|(c, value)| if value.is_nan() { f32::NAN } else { c + middle })
-        .collect())
+    let back = |(c, value): (&f32, f32)| if value.is_nan() { f32::NAN } else { c + middle };
+    Ok(moved.par_iter().zip(values.par_iter()).map(back).numbers())
 }
 
 /// The solution if G is a product: `N·v`, then one axis after the other.
@@ -175,7 +172,7 @@ fn along_axes(dims: UVec3, values: ValueSlice<'_>, middle: f32, falloff: f64, pr
     let neighbour = libm::exp(-falloff);
     let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
     let filters = [nx, ny, nz].map(|n| Sweeps::new(n, neighbour));
-    let mut c: Vec<f32> = values.par_iter().map(|value| value - middle).collect();
+    let mut c: Vec<f32> = values.par_iter().map(|value| value - middle).numbers();
     // N is a product too: the rows along each axis can be multiplied by their sums right before they are solved.
     c.par_chunks_mut(nx).for_each(|row| filters[0].solve(row, 1, 0));
     progress(0.3);
@@ -243,13 +240,13 @@ fn conjugate_gradients(
     tolerance: f64,
     progress: &dyn Fn(f64),
 ) -> Option<Vec<f32>> {
-    let is_hole: Vec<bool> = values.par_iter().map(|value| value.is_nan()).collect();
-    let moved: Vec<f32> = values.par_iter().map(|value| if value.is_nan() { 0.0 } else { value - middle }).collect();
-    let present: Vec<f32> = is_hole.par_iter().map(|&is_hole| if is_hole { 0.0 } else { 1.0 }).collect();
+    let is_hole: Vec<bool> = values.par_iter().map(|value| value.is_nan()).numbers();
+    let moved: Vec<f32> = values.par_iter().map(|value| if value.is_nan() { 0.0 } else { value - middle }).numbers();
+    let present: Vec<f32> = is_hole.par_iter().map(|&is_hole| if is_hole { 0.0 } else { 1.0 }).numbers();
     let weights = taps.convolve(grid, &present, &is_hole);
     let first = taps.convolve(grid, &moved, &is_hole);
     let mut residual: Vec<f32> =
-        (weights.par_iter().zip(&moved).zip(&first)).map(|((weight, value), first)| weight * value - first).collect();
+        (weights.par_iter().zip(&moved).zip(&first)).map(|((weight, value), first)| weight * value - first).numbers();
     let mut c = moved;
     let mut direction = residual.clone();
     let mut squared = dot(&residual, &residual);

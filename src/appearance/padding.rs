@@ -1,7 +1,6 @@
 //! The padding that CT scanners write outside the scanned cylinder.
 
 #[cfg(not(target_arch = "wasm32"))]
-use crate::parallel::prelude::*;
 use crate::volume::ValueSlice;
 
 /// Air in Hounsfield units.

@@ -2,7 +2,6 @@
 
 use crate::lists::iso_range::{of_ordinal, ordinal};
 #[cfg(not(target_arch = "wasm32"))]
-use crate::parallel::prelude::*;
 use crate::volume::ValueSlice;
 
 /// The number of values that one thread counts at a time.

@@ -6,7 +6,6 @@ use super::object::Object;
 use super::preset::Preset;
 use super::quantile::quantiles;
 #[cfg(not(target_arch = "wasm32"))]
-use crate::parallel::prelude::*;
 use crate::volume::{ValueSlice, Volume};
 
 /// Hounsfield units of air, of soft tissue, and of everything denser than lungs.

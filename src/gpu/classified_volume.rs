@@ -387,7 +387,7 @@ impl ClassifiedVolume {
             let (clipped, listed, of) = (&self.clipped, listed.list(), TakingPart::new(volume, &transfer));
             let takes_part = |index: u32| clipped.contain(volume.grid().voxel_at(index)) && of.takes_part(index);
             let changed = candidates.par_iter().filter(|&&index| takes_part(index) != listed.contains(index));
-            changed.copied().partition(|&index| !listed.contains(index))
+            changed.copied().collect::<Vec<_>>().into_iter().partition(|&index| !listed.contains(index))
         };
         let changes: Vec<(Vec<u32>, Vec<u32>)> = self.lists.iter().zip(self.listed()).map(changes).collect();
         self.change_all(&changes)

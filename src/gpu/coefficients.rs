@@ -72,7 +72,7 @@ impl Coefficients {
         kept(&self.texture, || {
             let mut all: Vec<f32> = Vec::new();
             for (values, numbers) in self.values.iter().zip(&self.numbers) {
-                all.par_extend(values.par_iter().map(|&c| numbers.apply(f64::from(c)) as f32));
+                all.extend(values.par_iter().map(|&c| numbers.apply(f64::from(c)) as f32).numbers());
             }
             scoped(device, || VolumeTexture::upload_bits(device, queue, &all))?
         })

@@ -64,7 +64,7 @@ pub(crate) fn farthest(
             shown.map(|x| square(x, y, z)).fold(farthest, f64::max)
         })
     };
-    (first.z..=last.z).into_par_iter().map(of_slice).reduce(|| 0.0, f64::max).sqrt()
+    (first.z..last.z + 1).into_par_iter().map(of_slice).reduce(|| 0.0, f64::max).sqrt()
 }
 
 fn sums(mut a: Vec<u64>, b: &[u64]) -> Vec<u64> {

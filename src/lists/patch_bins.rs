@@ -411,5 +411,5 @@ fn dispatches(starts: &[u32], groups: usize, passes: &Passes) -> Result<u32, Til
         }
         Ok(dispatches)
     };
-    (0..patches).into_par_iter().map(of_patch).try_reduce(|| 0, |a, b| Ok(a.max(b)))
+    Ok((0..patches).into_par_iter().map(of_patch).collect::<Result<Vec<_>, _>>()?.into_iter().fold(0, u32::max))
 }

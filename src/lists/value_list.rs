@@ -23,7 +23,7 @@ impl ValueList {
             .map(|(index, value)| u64::from(ordinal(value)) << 32 | index as u64)
             .collect();
         keyed.par_sort_unstable();
-        Self { least, voxels: keyed.par_iter().map(|&key| key as u32).collect() }
+        Self { least, voxels: keyed.par_iter().map(|&key| key as u32).numbers() }
     }
 
     /// The voxels whose values are in a set, range by range. Voxels of the minimum value are searched for in the volume.

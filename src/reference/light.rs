@@ -197,7 +197,7 @@ fn lit_voxels(
         let splat = Splat { center: geometry.pixel(voxel), depth: geometry.depth(voxel), amount, alpha: 1.0 };
         (is_kept && sum > 0.0).then_some((index, splat))
     };
-    (0..volume.values().len() as u32).into_par_iter().filter_map(splat).unzip()
+    (0..volume.values().len() as u32).into_par_iter().filter_map(splat).collect::<Vec<_>>().into_iter().unzip()
 }
 
 /// The amounts `sheet.a` of a slab.
@@ -236,7 +236,7 @@ fn spread_light(plane: &[f64], width: usize, step: usize, weights: &[f64]) -> Ve
         let pair = |(offset, weight): (i64, &f64)| weight * (tap(offset) + tap(-offset));
         weights[0] * tap(0) + (1..).zip(&weights[1..]).map(pair).sum::<f64>()
     };
-    (0..plane.len()).into_par_iter().map(pixel).collect()
+    (0..plane.len()).into_par_iter().map(pixel).numbers()
 }
 
 #[cfg(test)]

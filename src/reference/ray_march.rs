@@ -132,7 +132,7 @@ impl Field {
         let voxels = shading::taking_part(volume, transfer, geometry);
         let emission = |&index: &u32| shading::emission(volume, transfer, (scene, &lights), geometry, index);
         let mut emissions = vec![DVec4::ZERO];
-        emissions.par_extend(voxels.par_iter().map(emission));
+        emissions.extend(voxels.par_iter().map(emission).numbers());
         let mut places = vec![0; volume.values().len()];
         voxels.iter().zip(1..).for_each(|(&voxel, place)| places[voxel as usize] = place);
 

@@ -24,8 +24,8 @@ impl Volume {
         spacing: DVec3,
         (colors, kind): (&[[f32; 4]], SampleType),
     ) -> Result<Self, VolumeError> {
-        let values = colors.par_iter().map(|color| luminance(*color)).collect();
-        let texels: Arc<[Texel]> = colors.par_iter().map(|color| texel(*color, kind)).collect();
+        let values = colors.par_iter().map(|color| luminance(*color)).numbers();
+        let texels: Arc<[Texel]> = colors.par_iter().map(|color| texel(*color, kind)).numbers().into();
         Ok(Self { colors: Some(texels), ..Self::new(origin, dims, spacing, values)? })
     }
 
@@ -44,7 +44,7 @@ impl Volume {
                 if index < numbers.len() { numbers.at(index) } else { full }
             })
         };
-        let colors: Vec<[f32; 4]> = (0..count).into_par_iter().map(color).collect();
+        let colors: Vec<[f32; 4]> = (0..count).into_par_iter().map(color).numbers();
         Self::from_colors(origin, dims, spacing, (&colors, kind))
     }
 

@@ -115,7 +115,7 @@ impl Volume {
             // Beside a hole both are holes.
             if resampling == Resampling::Linear || linear.is_nan() { linear } else { self.value(at.round().as_uvec3()) }
         };
-        let values: Vec<f32> = (0..count).into_par_iter().map(place).map(value).collect();
+        let values: Vec<f32> = (0..count).into_par_iter().map(place).map(value).numbers();
         if values.iter().all(|value| value.is_nan()) {
             let name = origin.display().to_string();
             let [own, other] = [places[1], places[0]].map(bounds);
@@ -131,14 +131,14 @@ impl Volume {
         log::warn!("{name}: {key}: resampled from {own} to {dims} voxels, the first channel's{nearest}");
         let labels: Option<Arc<[u16]>> = self.labels().map(|labels| {
             let nearest = |index: u32| voxel_around(place(index), self.grid()).map_or(0, |at| labels[at]);
-            (0..count).into_par_iter().map(nearest).collect()
+            (0..count).into_par_iter().map(nearest).numbers().into()
         });
         let colors: Option<Arc<[Texel]>> = self.colors().map(|colors| {
             let component = |at: DVec3, number: usize| {
                 self.between(at, |voxel| colors[self.grid().index_of(voxel) as usize][number].into()).round() as u16
             };
             let color = |at: DVec3| [0, 1, 2, 3].map(|number| component(at.clamp(DVec3::ZERO, own_last), number));
-            (0..count).into_par_iter().map(|index| color(place(index))).collect()
+            (0..count).into_par_iter().map(|index| color(place(index))).numbers().into()
         });
         let resampled = Self::new(key, dims, grid.spacing(), values)?;
         let Self { label_names, unit, value_unit, encoding, palette, channel_name, display, .. } = self;
@@ -210,7 +210,7 @@ pub(super) fn labels_onto(
     }
     let (name, from, to) = (path.display(), own.0.dims, volume.0.dims);
     log::warn!("{name}: {KEY}: resampled from {from} to {to} voxels, the volume's, each label the nearest one");
-    Ok(Some((0..count).into_par_iter().map(|at| index(at).map_or(0, |at| labels[at])).collect()))
+    Ok(Some((0..count).into_par_iter().map(|at| index(at).map_or(0, |at| labels[at])).numbers().into()))
 }
 
 /// The box of a grid's voxel centres, in its file's space or, without one, around its centre.

@@ -171,7 +171,7 @@ impl<'a> ValueSlice<'a> {
     #[doc(hidden)]
     pub fn whole_range(self) -> Option<[i32; 2]> {
         let ranges = self.par_chunks(CHUNK).map(|chunk| for_type!(Self, chunk, values => whole_range(values)));
-        ranges.try_reduce(|| EMPTY, |a, b| Some(union(a, b)))
+        Some(ranges.collect::<Option<Vec<_>>>()?.into_iter().fold(EMPTY, union))
     }
 }
 

@@ -54,7 +54,7 @@ impl Cells {
         let bits_of = bits_of(numbers, shown);
         let least = if work == Work::Alone { usize::MAX } else { 1 << 16 };
         let mut bits: Vec<u8> = for_type!(ValueSlice, coefficients, all => {
-            all.par_iter().with_min_len(least).map(|c| bits_of(c.to_f32())).collect()
+            all.par_iter().with_min_len(least).map(|c| bits_of(c.to_f32())).numbers()
         });
         // From -⌈h⌉ + 1 to ⌈h⌉ around a cell, where a kernel reaches less than h.
         let half = half_box.ceil().min(grid.dims.as_dvec3()).max(DVec3::ONE).as_uvec3();
