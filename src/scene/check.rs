@@ -43,7 +43,7 @@ impl TransferSettings {
         check_labels(table, &self.labels)
     }
 
-    fn parts(&self) -> Parts<'_> {
+    fn parts(&self) -> Parts<'_, u64> {
         let (color, opacity) = (self.color.as_ref(), self.opacity.as_ref());
         Parts { color, opacity, iso_ranges: self.iso_ranges.as_deref(), labels: &self.labels }
     }

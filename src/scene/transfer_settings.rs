@@ -24,22 +24,33 @@ pub struct TransferSettings {
     pub gradient_opacity: Option<Ramp<f64>>,
     /// Closed intervals `[lo, hi]` of the values that take part; `None` means all values.
     pub iso_ranges: Option<Vec<[f64; 2]>>,
-    /// Tables for single labels of a segmented volume; empty for other volumes.
-    pub labels: BTreeMap<u16, LabelTables>,
+    /// Tables for single labels of a segmented volume, by their numbers in the file ([`Volume::label_ids`]); empty for other volumes. Numbers that the file
+    /// lacks have no effect.
+    pub labels: BTreeMap<u64, LabelTables>,
 }
 
 impl From<TransferFunction> for TransferSettings {
-    /// Settings that state everything about one channel; further ones are ignored.
+    /// Settings that state everything about one channel, whose labels are their own numbers; further channels are ignored.
     fn from(transfer: TransferFunction) -> Self {
         // Whether values are labels is the volume's own.
         let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, membership: _, further: _ } =
             transfer;
         let (color, opacity) = (Some(color), Some(opacity));
+        let labels = labels.into_iter().map(|(label, tables)| (label.into(), tables)).collect();
         Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
     }
 }
 
 impl TransferSettings {
+    /// Settings that state everything about a volume's own channel, with labels by their numbers in its file.
+    #[doc(hidden)]
+    pub fn stating(transfer: TransferFunction, volume: &Volume) -> Self {
+        let settings = Self::from(transfer);
+        let id = |label: u64| u16::try_from(label).map_or(label, |label| volume.label_id(label));
+        let labels = settings.labels.into_iter().map(|(label, tables)| (id(label), tables)).collect();
+        Self { labels, ..settings }
+    }
+
     /// Whether more is stated than a preset.
     pub(super) fn states_more(&self) -> bool {
         *self != Self { preset: self.preset, ..Self::default() }
@@ -73,7 +84,8 @@ impl TransferSettings {
         // Presets have no gradient opacity.
         transfer.gradient_opacity = self.gradient_opacity.clone();
         transfer.iso_ranges = self.iso_ranges.clone();
-        for (&label, own) in &self.labels {
+        for (&id, own) in &self.labels {
+            let Some(label) = volume.label_of_id(id) else { continue };
             let LabelTables { color, opacity, gradient_opacity, membership, .. } =
                 transfer.labels.remove(&label).unwrap_or_default();
             let tables = LabelTables {

@@ -1,6 +1,7 @@
 //! Transfer functions, from voxel values to colour and opacity (SPEC §3).
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::ops::{Add, Mul};
 
 use glam::{DVec3, UVec3};
@@ -220,18 +221,21 @@ fn check_length(key: &str, count: usize, most: usize) -> Result<(), SettingError
 }
 
 /// The parts of a channel's tables that determine their pieces; `None` stands for a short ramp that is chosen from the volume.
-pub(crate) struct Parts<'a> {
+pub(crate) struct Parts<'a, L> {
     pub(crate) color: Option<&'a Ramp<DVec3>>,
     pub(crate) opacity: Option<&'a Ramp<f64>>,
     pub(crate) iso_ranges: Option<&'a [[f64; 2]]>,
-    pub(crate) labels: &'a BTreeMap<u16, LabelTables>,
+    pub(crate) labels: &'a BTreeMap<L, LabelTables>,
 }
 
 /// Checks that the tables of all channels have a bounded number of pieces: those of a channel count again for each label that uses them.
-pub(crate) fn check_pieces<'a>(table: &str, channels: impl Iterator<Item = Parts<'a>>) -> Result<(), SettingError> {
+pub(crate) fn check_pieces<'a, L: 'a>(
+    table: &str,
+    channels: impl Iterator<Item = Parts<'a, L>>,
+) -> Result<(), SettingError> {
     let of_opacity = |ramp: Option<&Ramp<f64>>| ramp.map_or(1, opacity_pieces);
     let of_color = |ramp: Option<&Ramp<DVec3>>| ramp.map_or(1, |ramp| ramp.points().len());
-    let of_channel = |Parts { color, opacity, iso_ranges, labels }: Parts| {
+    let of_channel = |Parts { color, opacity, iso_ranges, labels }: Parts<L>| {
         let (opacities, colors) = (of_opacity(opacity), of_color(color));
         let ends = 2 * iso_ranges.map_or(0, <[_]>::len);
         let of_label = |own: &LabelTables| {
@@ -284,7 +288,7 @@ pub(crate) fn check_ramps(
 }
 
 /// Checks the tables of labels.
-pub(crate) fn check_labels(table: &str, labels: &BTreeMap<u16, LabelTables>) -> Result<(), SettingError> {
+pub(crate) fn check_labels<L: Display>(table: &str, labels: &BTreeMap<L, LabelTables>) -> Result<(), SettingError> {
     labels.iter().try_for_each(|(label, tables)| tables.check(&format!("{table}.label[{label}]")))
 }
 
@@ -326,7 +330,7 @@ impl TransferFunction {
         check_labels(table, &self.labels)
     }
 
-    fn parts(&self) -> Parts<'_> {
+    fn parts(&self) -> Parts<'_, u16> {
         let Self { color, opacity, iso_ranges, labels, .. } = self;
         Parts { color: Some(color), opacity: Some(opacity), iso_ranges: iso_ranges.as_deref(), labels }
     }

@@ -7,6 +7,7 @@ use glam::{DVec3, UVec3};
 
 use super::display::ChannelDisplay;
 use super::error::volume::invalid;
+use super::label_ids::by_label;
 use super::sample_type::SampleType;
 use super::series::Series;
 use super::voxel::{Many, Voxel};
@@ -55,8 +56,8 @@ pub(super) struct Loaded<T: Voxel> {
 /// The names and colours that a file gives to single values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Legend {
-    /// The values' names, if they are labels.
-    pub(super) names: BTreeMap<u16, String>,
+    /// The names of labels, by their ids.
+    pub(super) names: BTreeMap<u64, String>,
     /// Their colours, in ascending order of values.
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
     /// Whether the file says that all values are labels, with or without names.
@@ -113,7 +114,8 @@ impl<T: Voxel> Loaded<T> {
     /// The facts that the file, of some format, states about one of its channels, `number` among those that are read. The first channel has the facts that concern all.
     pub(super) fn facts(&self, format: &'static str, channel: usize, number: usize) -> StoreFacts {
         let Self { series, spacing, unit, .. } = self;
-        let Legend { names: label_names, palette, are_labels } = self.legend(channel, number);
+        let Legend { names, palette, are_labels } = self.legend(channel, number);
+        let label_names = by_label(names, None);
         let orientation = self.orientation.filter(|_| number == 0);
         let channels = if series.is_color { 1 } else { series.channels };
         let display = self.displays.get(channel).filter(|display| **display != ChannelDisplay::default());

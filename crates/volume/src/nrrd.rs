@@ -288,13 +288,13 @@ impl Header {
             Some(DVec3::new(red, green, blue))
                 .filter(|color| color.cmpge(DVec3::ZERO).all() && color.cmple(DVec3::ONE).all())
         };
-        let colors: BTreeMap<u16, DVec3> =
+        let colors: BTreeMap<u64, DVec3> =
             self.segments("_Color", layer).filter_map(|(label, text)| Some((label, color(text)?))).collect();
-        (!colors.is_empty()).then(|| colors.into_iter().map(|(label, color)| (f64::from(label), color)).collect())
+        (!colors.is_empty()).then(|| colors.into_iter().map(|(label, color)| (label as f64, color)).collect())
     }
 
     /// The labels of the segments of a layer, or of all, and what is said of each by a key with some end.
-    fn segments(&self, end: &str, layer: Option<u32>) -> impl Iterator<Item = (u16, &String)> {
+    fn segments(&self, end: &str, layer: Option<u32>) -> impl Iterator<Item = (u64, &String)> {
         self.1.iter().filter_map(move |(key, value)| {
             let segment = key.strip_suffix("_LabelValue").filter(|segment| segment.starts_with("Segment"))?;
             // One that states no layer lies in the first.

@@ -9,6 +9,7 @@ use super::access::{Access, ReadOptions};
 use super::error::volume::{VolumeError, invalid, refused};
 use super::format;
 use super::loaded::{Levels, Loaded};
+use super::numbered::are_beyond_16_bits;
 use super::store::{Store, StoreFacts};
 use super::texel::COLOR_BYTES;
 use super::values::Values;
@@ -47,10 +48,16 @@ impl Volume {
         };
         let mut facts = channels.enumerate().map(facts).collect::<Vec<StoreFacts>>().into_iter();
         let is_left_handed = loaded.is_left_handed();
+        let legend = loaded.legend(first_channel, 0);
         let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
         let origin = path.display().to_string();
         let spacing = access.spacing().or(spacing).unwrap_or(DVec3::ONE);
-        access.take_rounding().warn(path, sample_type, values.as_slice());
+        let rounding = access.take_rounding();
+        let is_single = values.as_slice().len() == dims.element_product() as usize;
+        let may_be_ids = is_single && !series.is_color && are_beyond_16_bits(values.as_slice());
+        if !may_be_ids {
+            rounding.warn(path, sample_type, values.as_slice());
+        }
         if series.is_color {
             let bytes = COLOR_BYTES * u64::from(dims.element_product());
             access.reserve(path, "data", format!("{dims} voxels with colours"), bytes)?;
@@ -70,6 +77,12 @@ impl Volume {
             Self::from_values(&origin, dims, spacing, values)?.stating(&origin, facts.next().unwrap_or_default())
         };
         let mut first = channel(values)?;
+        if may_be_ids {
+            match first.labels_beyond_16_bits(path, &legend, access) {
+                Some(labels) => first = first.with_numbered(labels),
+                None => rounding.warn(path, sample_type, first.values()),
+            }
+        }
         let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
         if let Some(Levels { dims, level, grid, reads }) = levels {
             let grid = access.spacing().map_or(grid, |spacing| grid.with_finest_spacing(spacing));

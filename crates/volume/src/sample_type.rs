@@ -9,6 +9,9 @@ pub trait Sample: Copy {
     /// The nearest `f64`.
     fn to_f64(self) -> f64;
 
+    /// The number if it is whole and at least 0: the id of a label.
+    fn to_id(self) -> Option<u64>;
+
     /// Whether all numbers of the type are whole.
     const IS_WHOLE: bool;
 
@@ -56,6 +59,11 @@ macro_rules! primitive_samples {
                 self as f64
             }
 
+            fn to_id(self) -> Option<u64> {
+                let whole = self as i128;
+                (whole as $type == self).then(|| u64::try_from(whole).ok()).flatten()
+            }
+
             const IS_WHOLE: bool = 0.5_f64 as $type as f64 == 0.0;
             const MAY_ROUND: bool = size_of::<$type>() > 4 || size_of::<$type>() == 4 && Self::IS_WHOLE;
 
@@ -93,6 +101,10 @@ impl Sample for crate::half::Half {
 
     fn to_f64(self) -> f64 {
         self.value().into()
+    }
+
+    fn to_id(self) -> Option<u64> {
+        self.value().to_id()
     }
 
     fn error_if_whole(self) -> f64 {

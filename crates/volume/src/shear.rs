@@ -365,8 +365,9 @@ mod tests {
     #[test]
     fn labels_are_the_nearest_ones_and_holes_spread() {
         let steps = [DVec3::X, DVec3::Y, DVec3::new(0.25, 0.0, 1.0)];
-        let labels = straighten(UVec3::new(3, 1, 3), steps, vec![1_u16, 2, 3, 4, 5, 6, 7, 8, 9]);
-        assert_eq!((labels.dims.x, labels.values), (4, vec![1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 9]));
+        let labels = straighten(UVec3::new(3, 1, 3), steps, vec![1_u64, 2, 3, 4, 5, 6, 7, 8, 9]);
+        let found: Vec<u64> = (0..12).map(|at| labels.values.at(at)).collect();
+        assert_eq!((labels.dims.x, labels.values.count(), found), (4, 12, vec![1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 9]));
         let values = straighten(UVec3::new(3, 1, 2), steps, vec![1.0, 2.0, 3.0, 4.0, 5.0, f32::NAN]);
         let found: Vec<bool> = values.values.as_slice().iter().map(|value| value.is_nan()).collect();
         assert_eq!(found, [false, false, false, false, false, true]);

@@ -104,8 +104,8 @@ mod tests {
         let values = Values::from(vec![0.0, 1.0, 10.0, 11.0, 30.0, 31.0, 40.0, 41.0]);
         let resampled = even.resampled::<f32>(&values, 2, 4).unwrap();
         assert_eq!(resampled.as_slice(), [0.0, 1.0, 10.0, 11.0, 20.0, 21.0, 30.0, 31.0, 40.0, 41.0]);
-        let labels = even.resampled::<u16>(&vec![1, 2, 3, 4], 1, 4).unwrap();
-        assert_eq!(labels, [1, 2, 3, 3, 4]);
+        let labels = even.resampled::<u64>(&vec![1, 2, 3, 4].into(), 1, 4).unwrap();
+        assert_eq!((0..labels.count()).map(|at| labels.at(at)).collect::<Vec<_>>(), [1, 2, 3, 3, 4]);
     }
 
     /// A field that is linear along the axis stays as it is, wherever its samples lie.

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::super::loaded::Legend;
 
 use super::super::display::ChannelDisplay;
+use super::super::sample_type::Sample;
 use super::json::Json;
 
 /// The names of channels and how they are shown, as `omero` states them.
@@ -43,7 +44,7 @@ fn color(text: &str) -> Option<DVec3> {
 pub(super) fn labels(image_label: &Json) -> Legend {
     let value = |label: &Json| {
         let number = label.get("label-value").number()?;
-        (number.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&number)).then_some(number as u16)
+        number.to_id()
     };
     let name = |label: &Json| {
         let name = ["name", "class", "label"].iter().find_map(|key| label.get(key).text())?;
@@ -55,8 +56,8 @@ pub(super) fn labels(image_label: &Json) -> Legend {
         Some((value(label)?, DVec3::new(red, green, blue).clamp(DVec3::ZERO, DVec3::splat(255.0)) / 255.0))
     };
     let names = image_label.get("properties").members().iter().filter_map(name).collect();
-    let colors: BTreeMap<u16, DVec3> = image_label.get("colors").members().iter().filter_map(color).collect();
-    let palette: Vec<_> = colors.into_iter().map(|(value, color)| (f64::from(value), color)).collect();
+    let colors: BTreeMap<u64, DVec3> = image_label.get("colors").members().iter().filter_map(color).collect();
+    let palette: Vec<_> = colors.into_iter().map(|(value, color)| (value as f64, color)).collect();
     let palette = Some(palette).filter(|palette| !palette.is_empty());
     Legend { names, palette, are_labels: image_label.is_some() }
 }

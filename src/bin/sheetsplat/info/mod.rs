@@ -220,6 +220,9 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
     if let Some(found) = labels(volume) {
         line("labels", found.to_owned());
     }
+    if let Some(ids @ [first, .., last]) = volume.label_ids() {
+        line("ids", format!("{first} to {last}; values and labels below are their places, 0 to {}", ids.len() - 1));
+    }
     if let Some([x, y, z]) = info.sample {
         line(
             "sample",
