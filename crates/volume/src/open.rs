@@ -54,7 +54,11 @@ impl Volume {
         let spacing = access.spacing().or(spacing).unwrap_or(DVec3::ONE);
         let rounding = access.take_rounding();
         let is_single = values.as_slice().len() == dims.element_product() as usize;
-        let may_be_ids = is_single && !series.is_color && are_beyond_16_bits(values.as_slice());
+        // Pages, which are to be small, take large ids for values, and say that these are rounded.
+        let may_be_ids = cfg!(not(target_arch = "wasm32"))
+            && is_single
+            && !series.is_color
+            && are_beyond_16_bits(values.as_slice());
         if !may_be_ids {
             rounding.warn(path, sample_type, values.as_slice());
         }

@@ -60,8 +60,10 @@ macro_rules! primitive_samples {
             }
 
             fn to_id(self) -> Option<u64> {
-                let whole = self as i128;
-                (whole as $type == self).then(|| u64::try_from(whole).ok()).flatten()
+                const END: f64 = 18_446_744_073_709_551_616.0;
+                let (id, near) = (self as u64, self as f64);
+                let is_in_range = near >= 0.0 && (Self::IS_WHOLE || near < END);
+                (is_in_range && id as $type == self).then_some(id)
             }
 
             const IS_WHOLE: bool = 0.5_f64 as $type as f64 == 0.0;
