@@ -12,25 +12,24 @@ use super::head::{head, is_bare_dicom};
 use super::loaded::Loaded;
 use super::seek::FileStore;
 use super::store::Store;
-use super::voxel::Voxel;
 use super::{Grid, VolumeError, folder, nrrd, turned};
 
-type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
+type Reader = fn(&Path, &Access) -> Result<Loaded, VolumeError>;
 
 /// Reads a volume from a folder, given those of its files that are of the format.
-type FolderReader<T> = fn(&Path, &[PathBuf], &Access) -> Result<Loaded<T>, VolumeError>;
+type FolderReader = fn(&Path, &[PathBuf], &Access) -> Result<Loaded, VolumeError>;
 
 /// A format and its reader.
-struct Format<T: Voxel> {
+struct Format {
     name: &'static str,
     /// The extensions of its files.
     extensions: &'static [&'static str],
     /// Whether a file that begins with these bytes is certainly of this format.
     is_magic: fn(&[u8]) -> bool,
     /// The reader, or the feature that would compile it.
-    read: Result<Reader<T>, &'static str>,
+    read: Result<Reader, &'static str>,
     /// The reader of a folder of slices, if the format has them.
-    read_folder: Option<FolderReader<T>>,
+    read_folder: Option<FolderReader>,
 }
 
 /// A module's reader, or the feature that would compile it.
@@ -57,7 +56,7 @@ const NO_SERIES: &str = "no series, which only DICOM has";
 /// Formats with one slice per file of a folder.
 const SLICES: [&str; 2] = ["TIFF", DICOM];
 
-fn formats<T: Voxel>() -> Vec<Format<T>> {
+fn formats() -> Vec<Format> {
     vec![
         // The preamble before `DICM` may be the beginning of any other file, often of a TIFF (PS3.10 7.1), so that this format comes first. The group of
         // the element after it tells it from another format's text.
@@ -156,7 +155,7 @@ fn formats<T: Voxel>() -> Vec<Format<T>> {
 
 /// Reads a file and returns the name of its format, determined by its first bytes or else by its name; or reads a folder of slices,
 /// whose format the first bytes of all its files determine.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<(&'static str, Loaded), VolumeError> {
     let formats = formats();
     let (file, _) = archive_and_inner(path);
     let format = format_at(&formats, path, access)?;
@@ -190,7 +189,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
 
 /// Opens the selected channels of a file that is read by boxes.
 pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
-    let formats = formats::<f32>();
+    let formats = formats();
     let format = format_at(&formats, path, access)?;
     if let Some(series) = access.series().filter(|_| format.is_some_and(|of| of.name != DICOM)) {
         return Err(invalid(path, "series", series, NO_SERIES));
@@ -219,7 +218,7 @@ pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn St
 
 /// The grids of a store's levels, from the finest; empty for files of other formats.
 pub fn levels(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeError> {
-    match format_at(&formats::<f32>(), path, access)? {
+    match format_at(&formats(), path, access)? {
         #[cfg(feature = "zarr")]
         Some(Format { name: ZARR, .. }) => super::zarr::grids(path, access),
         _ => Ok(Vec::new()),
@@ -227,11 +226,7 @@ pub fn levels(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeError> {
 }
 
 /// The format of a file or of a Zarr store; `None` if it is unknown, or for another folder.
-fn format_at<'a, T: Voxel>(
-    formats: &'a [Format<T>],
-    path: &Path,
-    access: &Access,
-) -> Result<Option<&'a Format<T>>, VolumeError> {
+fn format_at<'a>(formats: &'a [Format], path: &Path, access: &Access) -> Result<Option<&'a Format>, VolumeError> {
     if access.is_address(path)? {
         return Ok(formats.iter().find(|format| format.name == ZARR));
     }
@@ -257,28 +252,23 @@ fn is_zarr(folder: &Path, access: &Access) -> Result<bool, VolumeError> {
 }
 
 /// A file's format, and whether its first bytes determined it.
-fn format_of<'a, T: Voxel>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
+fn format_of<'a>(formats: &'a [Format], path: &Path, head: &[u8]) -> Option<(&'a Format, bool)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let is_named = |format: &Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
+    let is_named = |format: &Format| format.extensions.iter().any(|extension| name.ends_with(extension));
     let named = formats.iter().find(|format| is_named(format));
     // Ambiguous first bytes count only if the name does not contradict them.
-    let is_bare = |format: &Format<T>| {
-        format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM)
-    };
-    let is_other_archive = |format: &Format<T>| format.name == NPZ && named.is_some_and(|named| named.name == ZARR);
-    let by_head = |format: &&Format<T>| (format.is_magic)(head) && !is_other_archive(format) || is_bare(format);
+    let is_bare =
+        |format: &Format| format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM);
+    let is_other_archive = |format: &Format| format.name == NPZ && named.is_some_and(|named| named.name == ZARR);
+    let by_head = |format: &&Format| (format.is_magic)(head) && !is_other_archive(format) || is_bare(format);
     formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
 }
 
-fn read_folder<T: Voxel>(
-    path: &Path,
-    access: &Access,
-    formats: &[Format<T>],
-) -> Result<(&'static str, Loaded<T>), VolumeError> {
-    let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
+fn read_folder(path: &Path, access: &Access, formats: &[Format]) -> Result<(&'static str, Loaded), VolumeError> {
+    let mut slices: Vec<(&Format, Vec<PathBuf>)> = Vec::new();
     let files = folder::files(path, access)?;
     let count = files.len();
-    let is_of_slices = |format: &Format<T>| SLICES.contains(&format.name);
+    let is_of_slices = |format: &Format| SLICES.contains(&format.name);
     let mut left_out = Vec::new();
     for file in files {
         let head = head(&file, access)?;

@@ -15,6 +15,7 @@ use super::loaded::{Legend, Loaded};
 use super::membership::{KeptMembership, Members};
 use super::resample::labels_onto;
 use super::sample_type::Sample;
+use super::voxels::Wanted;
 use super::{Grid, Orientation, Volume, VolumeError};
 
 /// Spacings whose relative difference is less than this count as equal.
@@ -79,11 +80,11 @@ struct Stated {
 
 impl Stated {
     fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        let (_, loaded) = format::read::<u64>(path, access)?;
+        let (_, loaded) = format::read(path, &access.wanting(Wanted::Ids))?;
         loaded.check_single(path, "one: a label for every voxel")?;
         let Legend { names, palette, .. } = loaded.legend(access.selection().channel.unwrap_or(0) as usize, 0);
         let Loaded { dims, spacing, values, orientation, .. } = loaded;
-        let Numbered { labels: values, ids } = values.numbered(path)?;
+        let Numbered { labels: values, ids } = values.into_ids().numbered(path)?;
         let names = by_label(names, ids.as_deref());
         let colors = palette.into_iter().flatten().filter_map(|(id, color)| Some((id.to_id()?, color))).collect();
         let colors = by_label(colors, ids.as_deref());

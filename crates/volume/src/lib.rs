@@ -90,6 +90,7 @@ mod value_slice;
 mod values;
 mod volume;
 mod voxel;
+mod voxels;
 #[cfg(feature = "vtk")]
 mod vtk;
 #[cfg(any(feature = "tiff", feature = "vtk"))]

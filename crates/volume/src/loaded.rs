@@ -10,7 +10,7 @@ use super::error::volume::invalid;
 use super::label_ids::by_label;
 use super::sample_type::SampleType;
 use super::series::Series;
-use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
 use crate::StoreCounts;
 
@@ -19,7 +19,7 @@ use crate::StoreCounts;
 pub(super) const ASSUMED_AXES: &str = "the array's last ones are z, y and x";
 
 /// The contents of a file of values or labels.
-pub(super) struct Loaded<T: Voxel> {
+pub(super) struct Loaded {
     pub dims: UVec3,
     /// The type of the samples in the file.
     pub kind: SampleType,
@@ -50,7 +50,7 @@ pub(super) struct Loaded<T: Voxel> {
     /// The order of axes that was assumed, if the file states none.
     pub(super) assumed_axes: Option<&'static str>,
     /// One value per voxel, x fastest, channel by channel.
-    pub values: T::Many,
+    pub values: Voxels,
 }
 
 /// The names and colours that a file gives to single values.
@@ -84,9 +84,9 @@ pub(super) struct Levels {
     pub(super) reads: StoreCounts,
 }
 
-impl<T: Voxel> Loaded<T> {
+impl Loaded {
     /// Values about which the file states nothing else.
-    pub(super) fn new(dims: UVec3, kind: SampleType, values: T::Many) -> Self {
+    pub(super) fn new(dims: UVec3, kind: SampleType, values: Voxels) -> Self {
         let (legends, series, channel_names) = (Vec::new(), Series::default(), Vec::new());
         let (spacing, unit, orientation) = (None, None, None);
         let (time_names, series_names) = (Vec::new(), Vec::new());

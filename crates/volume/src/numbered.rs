@@ -14,6 +14,7 @@ use super::label_ids::{Numbered, by_label};
 use super::loaded::{Legend, Loaded};
 use super::sample_type::Sample;
 use super::value_slice::ValueSlice;
+use super::voxels::Wanted;
 use super::{Values, Volume};
 
 /// Labels in place of values, and what the file says of them.
@@ -84,10 +85,10 @@ impl Volume {
     }
 
     fn numbers_of(path: &Path, access: &Access) -> Result<Numbered, VolumeError> {
-        let (_, loaded) = format::read::<u64>(path, access)?;
+        let (_, loaded) = format::read(path, &access.wanting(Wanted::Ids))?;
         loaded.check_single(path, "one: a label for every voxel")?;
         let Loaded { values, .. } = loaded;
-        values.numbered(path)
+        values.into_ids().numbered(path)
     }
 }
 

@@ -14,6 +14,7 @@ use super::store::{Store, StoreFacts};
 use super::texel::COLOR_BYTES;
 use super::values::Values;
 use super::volume::Volume;
+use super::voxels::Wanted;
 
 impl Volume {
     /// Reads a volume file. Its first bytes determine the format, or else its extension: NRRD (`.nrrd`, `.nhdr`), and, each with the
@@ -39,7 +40,7 @@ impl Volume {
 
     #[doc(hidden)]
     pub fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        let (format, loaded) = format::read::<f32>(path, access)?;
+        let (format, loaded) = format::read(path, &access.wanting(Wanted::Values))?;
         let first_channel = access.selection().channel.unwrap_or(0) as usize;
         let channels = first_channel..(loaded.series.channels as usize).max(first_channel + 1);
         let facts = |(at, channel): (usize, usize)| {
@@ -49,16 +50,15 @@ impl Volume {
         let mut facts = channels.enumerate().map(facts).collect::<Vec<StoreFacts>>().into_iter();
         let is_left_handed = loaded.is_left_handed();
         let legend = loaded.legend(first_channel, 0);
-        let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
+        let Loaded { dims, kind: sample_type, spacing, series, levels, values, .. } = loaded;
+        let mut values = values.into_values();
         let origin = path.display().to_string();
         let spacing = access.spacing().or(spacing).unwrap_or(DVec3::ONE);
         let rounding = access.take_rounding();
         let is_single = values.as_slice().len() == dims.element_product() as usize;
         // Pages, which are to be small, take large ids for values, and say that these are rounded.
-        let may_be_ids = cfg!(not(target_arch = "wasm32"))
-            && is_single
-            && !series.is_color
-            && are_beyond_16_bits(values.as_slice());
+        let may_be_ids =
+            cfg!(not(target_arch = "wasm32")) && is_single && !series.is_color && are_beyond_16_bits(values.as_slice());
         if !may_be_ids {
             rounding.warn(path, sample_type, values.as_slice());
         }

@@ -5,6 +5,7 @@
 //! its planes, and each sample moves only within its plane: in a CT scan with a tilted gantry, within its slice. So one bilinear
 //! interpolation per voxel undoes any shear.
 
+use std::collections::TryReserveError;
 use std::path::Path;
 
 use glam::{DMat3, DVec3, UVec3};
@@ -16,6 +17,7 @@ use super::grid::dims_of;
 use super::loaded::Loaded;
 use super::orientation::{MAX_COSINE, lengths_and_directions};
 use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 use crate::parallel::prelude::*;
 
 /// The maximum angle in degrees between an axis and its orthogonal direction. Flatter volumes have damaged headers.
@@ -111,13 +113,13 @@ impl Lattice {
     ///
     /// # Errors
     /// If the orthogonal grid has too many voxels. `field` is the file's field with the axes.
-    pub(super) fn straighten<T: Voxel>(
+    pub(super) fn straighten(
         &self,
         path: &Path,
         field: &str,
-        loaded: Loaded<T>,
+        loaded: Loaded,
         access: &Access,
-    ) -> Result<Loaded<T>, VolumeError> {
+    ) -> Result<Loaded, VolumeError> {
         let Some(shear) = self.shear else { return Ok(loaded) };
         if access.is_noting() {
             let found = format!("axes sheared by {:.2}°", shear.degrees);
@@ -136,31 +138,23 @@ impl Lattice {
         };
         let Some(dims) = dims else { return Err(too_many(format!("an orthogonal grid of {sizes:?} voxels"))) };
         // Between samples values are no whole numbers.
-        let bytes = u64::from(dims.element_product()) * size_of::<T>() as u64;
+        let bytes = u64::from(dims.element_product()) * access.wanted().alone();
         access.reserve(path, field, format!("an orthogonal grid of {dims} voxels"), bytes)?;
-        let mut values = Vec::new();
-        let reserved = values.try_reserve_exact(dims.element_product() as usize);
-        reserved.map_err(|error| too_many(format!("an orthogonal grid of {dims} voxels: {error}")))?;
         log::warn!(
             "{}: sheared by {degrees:.2}°: resampled to an orthogonal grid of {dims} voxels, with holes beside the samples",
             path.display()
         );
         let first = DVec3::from_array(ranges.map(|[first, _]| first));
-        values.resize(dims.element_product() as usize, T::HOLE);
-        let source = Samples::<T> { dims: loaded.dims, values: &loaded.values };
-        let rows = values.par_chunks_mut(dims.x as usize).enumerate();
-        rows.for_each(|(row, values)| {
-            let (y, z) = (row as u32 % dims.y, row as u32 / dims.y);
-            for (x, value) in values.iter_mut().enumerate() {
-                let place = shear.in_source(UVec3::new(x as u32, y, z).as_dvec3() + first);
-                *value = source.at(place, shear.order).unwrap_or(T::HOLE);
-            }
-        });
+        let values = match &loaded.values {
+            Voxels::Values(values) => shear.resampled::<f32>((values, loaded.dims), (first, dims)).map(Voxels::from),
+            Voxels::Ids(ids) => shear.resampled::<u64>((ids, loaded.dims), (first, dims)).map(Voxels::from),
+        };
+        let values = values.map_err(|error| too_many(format!("an orthogonal grid of {dims} voxels: {error}")))?;
         let mut orientation = loaded.orientation;
         if let Some(orientation) = &mut orientation {
             orientation.origin += orientation.axes * (first * self.spacing);
         }
-        Ok(Loaded { dims, orientation, values: values.into(), ..loaded })
+        Ok(Loaded { dims, orientation, values, ..loaded })
     }
 }
 
@@ -171,6 +165,30 @@ fn split(vector: DVec3) -> (DVec3, f64) {
 }
 
 impl Shear {
+    /// Voxels on the orthogonal grid of some dimensions, whose first one lies at a place.
+    ///
+    /// # Errors
+    /// If there is no memory for them.
+    fn resampled<T: Voxel>(
+        &self,
+        (from, dims_from): (&T::Many, UVec3),
+        (first, dims): (DVec3, UVec3),
+    ) -> Result<T::Many, TryReserveError> {
+        let mut values = Vec::new();
+        values.try_reserve_exact(dims.element_product() as usize)?;
+        values.resize(dims.element_product() as usize, T::HOLE);
+        let source = Samples::<T> { dims: dims_from, values: from };
+        let rows = values.par_chunks_mut(dims.x as usize).enumerate();
+        rows.for_each(|(row, values)| {
+            let (y, z) = (row as u32 % dims.y, row as u32 / dims.y);
+            for (x, value) in values.iter_mut().enumerate() {
+                let place = self.in_source(UVec3::new(x as u32, y, z).as_dvec3() + first);
+                *value = source.at(place, self.order).unwrap_or(T::HOLE);
+            }
+        });
+        Ok(values.into())
+    }
+
     /// The first and last voxel along each axis of the orthogonal grid that lie in a sample's cell. Voxel 0 is at sample 0.
     fn ranges(&self, dims: UVec3) -> [[f64; 2]; 3] {
         let [a, b, c] = self.order;
@@ -246,12 +264,12 @@ mod tests {
     use super::super::sample_type::SampleType;
     use super::*;
 
-    fn loaded<T: Voxel>(dims: UVec3, lattice: &Lattice, origin: DVec3, values: Vec<T>) -> Loaded<T> {
+    fn loaded(dims: UVec3, lattice: &Lattice, origin: DVec3, values: impl Into<Voxels>) -> Loaded {
         let orientation = Some(Orientation { axes: lattice.axes, origin });
         Loaded { spacing: Some(lattice.spacing), orientation, ..Loaded::new(dims, SampleType::F32, values.into()) }
     }
 
-    fn straighten<T: Voxel>(dims: UVec3, steps: [DVec3; 3], values: Vec<T>) -> Loaded<T> {
+    fn straighten(dims: UVec3, steps: [DVec3; 3], values: impl Into<Voxels>) -> Loaded {
         let lattice = Lattice::of(steps).unwrap();
         let access = Access::new(&ReadOptions::default()).unwrap();
         lattice.straighten(Path::new("here"), "axes", loaded(dims, &lattice, DVec3::ZERO, values), &access).unwrap()
@@ -268,7 +286,7 @@ mod tests {
         let steps = [DVec3::new(0.0, 2.0, 0.0), DVec3::new(3.0, 0.0, 0.0002), DVec3::new(0.0, 0.0, 4.0)];
         let result = straighten(UVec3::new(2, 1, 1), steps, vec![1.0_f32, 2.0]);
         assert_eq!(result.dims, UVec3::new(2, 1, 1));
-        assert_eq!(result.values.as_slice(), [1.0, 2.0]);
+        assert_eq!(result.values.values(), [1.0, 2.0]);
     }
 
     /// Slices that a tilted gantry moves by one row each, and by half a row.
@@ -282,7 +300,7 @@ mod tests {
         assert_eq!((whole.dims, whole.spacing), (UVec3::new(1, 4, 3), Some(DVec3::new(1.0, 2.0, 4.0))));
         let expected = [0.0, 1.0, hole, hole, hole, 10.0, 11.0, hole, hole, hole, 20.0, 21.0];
         assert!(
-            whole.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            whole.values.values().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
             "{:?}",
             whole.values
         );
@@ -291,7 +309,7 @@ mod tests {
         assert_eq!(back.orientation.unwrap().origin, DVec3::new(0.0, -4.0, 0.0));
         let expected = [hole, hole, 0.0, 1.0, hole, 10.0, 11.0, hole, 20.0, 21.0, hole, hole];
         assert!(
-            back.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            back.values.values().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
             "{:?}",
             back.values
         );
@@ -300,7 +318,7 @@ mod tests {
         // Half a row off, the outer halves of the outermost cells have their samples' values.
         let expected = [0.0, 1.0, hole, 10.0, 10.5, 11.0, hole, 20.0, 21.0];
         assert!(
-            half.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            half.values.values().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
             "{:?}",
             half.values
         );
@@ -321,14 +339,14 @@ mod tests {
                 }
             }
             let position = |place: DVec3| steps[0] * place.x + steps[1] * place.y + steps[2] * place.z;
-            let values = places(dims).map(|place| field(position(place)) as f32).collect();
+            let values: Vec<f32> = places(dims).map(|place| field(position(place)) as f32).collect();
             let result = straighten(dims, steps, values);
             let Orientation { axes, origin } = result.orientation.unwrap();
             let spacing = result.spacing.unwrap();
             assert!((axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, 1e-12), "{mask}");
             let inverse = DMat3::from_cols(steps[0], steps[1], steps[2]).inverse();
             let (mut compared, mut held) = (0, 0);
-            for (place, value) in places(result.dims).zip(result.values.as_slice()) {
+            for (place, value) in places(result.dims).zip(result.values.values()) {
                 let at = origin + axes * (spacing * place);
                 let source = inverse * at;
                 let distance = (source - source.clamp(DVec3::ZERO, dims.as_dvec3() - 1.0)).abs().max_element();
@@ -366,10 +384,9 @@ mod tests {
     fn labels_are_the_nearest_ones_and_holes_spread() {
         let steps = [DVec3::X, DVec3::Y, DVec3::new(0.25, 0.0, 1.0)];
         let labels = straighten(UVec3::new(3, 1, 3), steps, vec![1_u64, 2, 3, 4, 5, 6, 7, 8, 9]);
-        let found: Vec<u64> = (0..12).map(|at| labels.values.at(at)).collect();
-        assert_eq!((labels.dims.x, labels.values.count(), found), (4, 12, vec![1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 9]));
+        assert_eq!((labels.dims.x, labels.values.ids()), (4, vec![1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 9]));
         let values = straighten(UVec3::new(3, 1, 2), steps, vec![1.0, 2.0, 3.0, 4.0, 5.0, f32::NAN]);
-        let found: Vec<bool> = values.values.as_slice().iter().map(|value| value.is_nan()).collect();
+        let found: Vec<bool> = values.values.values().iter().map(|value| value.is_nan()).collect();
         assert_eq!(found, [false, false, false, false, false, true]);
     }
 

@@ -29,24 +29,6 @@ pub(super) trait Many<T>: Default + Sync + From<Vec<T>> {
     /// Exchanges two runs of `count` voxels, of which the first one ends before the other begins.
     #[cfg(feature = "tiff")]
     fn swap(&mut self, first: usize, other: usize, count: usize);
-
-    /// Appends those of others that have some indices.
-    ///
-    /// # Errors
-    /// As for [`Self::append`].
-    fn append_from(&mut self, others: &Self, indices: impl Iterator<Item = usize>) -> Result<(), TryReserveError> {
-        /// The voxels that are copied at a time.
-        const BLOCK: usize = 1 << 12;
-        let (mut indices, mut block) = (indices, Vec::with_capacity(BLOCK));
-        loop {
-            block.clear();
-            block.extend(indices.by_ref().take(BLOCK).map(|index| others.at(index)));
-            if block.is_empty() {
-                return Ok(());
-            }
-            self.append(&block)?;
-        }
-    }
 }
 
 /// Values, in the fewest bits that hold them.
