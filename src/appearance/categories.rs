@@ -6,6 +6,7 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::quantile::histogram;
+#[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::{Volume, are_sharp};
@@ -82,11 +83,16 @@ pub(crate) fn transfer_of(volume: &Volume, labels: &[u16], palette: &[(f64, DVec
 }
 
 fn transfer_by(labels: &[u16], palette: &[(f64, DVec3)], color: impl Fn(u16) -> DVec3) -> TransferFunction {
-    let stated = |label: f64| palette.iter().find(|(value, _)| *value == label).map(|(_, color)| *color);
-    let of = |label: u16| (f64::from(label), stated(label.into()).unwrap_or_else(|| color(label)));
+    let of = |label: u16| (f64::from(label), stated_color(palette, label).unwrap_or_else(|| color(label)));
     let shown: Vec<_> = labels.iter().filter(|&&label| label > 0).map(|&label| of(label)).collect();
     let shown = if shown.is_empty() { vec![(0.0, DVec3::ONE)] } else { shown };
     TransferFunction::by_value(Ramp::through(shown), Ramp::through(vec![(0.0, 0.0), (1.0, OPACITY)]))
+}
+
+/// The colour that a file states for a label, given its colours in ascending order of values.
+fn stated_color(palette: &[(f64, DVec3)], label: u16) -> Option<DVec3> {
+    let at = palette.binary_search_by(|(value, _)| value.total_cmp(&label.into())).ok()?;
+    Some(palette[at].1)
 }
 
 /// Tables with the same colours for the labels of a segmented volume, whose opacities depend on its values. Label 0 is hidden.
@@ -97,7 +103,7 @@ pub fn tables(labels: &[u16]) -> BTreeMap<u16, LabelTables> {
 /// [`tables`] for the labels of a volume, with the colours that their file states, or else by their numbers in it.
 pub(crate) fn tables_of(volume: &Volume, labels: &[u16]) -> BTreeMap<u16, LabelTables> {
     let stated = volume.label_colors();
-    tables_by(labels, |label| stated.get(&label).copied().unwrap_or_else(|| color_of(volume, label)))
+    tables_by(labels, |label| stated_color(stated, label).unwrap_or_else(|| color_of(volume, label)))
 }
 
 fn tables_by(labels: &[u16], color: impl Fn(u16) -> DVec3) -> BTreeMap<u16, LabelTables> {
@@ -105,7 +111,11 @@ fn tables_by(labels: &[u16], color: impl Fn(u16) -> DVec3) -> BTreeMap<u16, Labe
         let color = Some(Ramp::through(vec![(0.0, color(label))]));
         LabelTables { visible: label > 0, color, ..LabelTables::default() }
     };
-    distinct(labels).into_iter().map(|label| (label, table(label))).collect()
+    let mut tables = BTreeMap::new();
+    for label in distinct(labels) {
+        tables.insert(label, table(label));
+    }
+    tables
 }
 
 /// A label's colour by its number in the file, the same in every volume. Numbers beyond 16 bits share colours with others.

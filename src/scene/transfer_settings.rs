@@ -32,23 +32,28 @@ pub struct TransferSettings {
 impl From<TransferFunction> for TransferSettings {
     /// Settings that state everything about one channel, whose labels are their own numbers; further channels are ignored.
     fn from(transfer: TransferFunction) -> Self {
-        // Whether values are labels is the volume's own.
-        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, membership: _, further: _ } =
-            transfer;
-        let (color, opacity) = (Some(color), Some(opacity));
-        let labels = labels.into_iter().map(|(label, tables)| (label.into(), tables)).collect();
-        Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
+        Self::numbered(transfer, &u64::from)
     }
 }
 
 impl TransferSettings {
+    /// Settings that state everything about one channel, given the number of each label.
+    fn numbered(transfer: TransferFunction, number: &dyn Fn(u16) -> u64) -> Self {
+        // Whether values are labels is the volume's own.
+        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, membership: _, further: _ } =
+            transfer;
+        let (color, opacity) = (Some(color), Some(opacity));
+        let mut numbered = BTreeMap::new();
+        for (label, tables) in labels {
+            numbered.insert(number(label), tables);
+        }
+        Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels: numbered }
+    }
+
     /// Settings that state everything about a volume's own channel, with labels by their numbers in its file.
     #[doc(hidden)]
     pub fn stating(transfer: TransferFunction, volume: &Volume) -> Self {
-        let settings = Self::from(transfer);
-        let id = |label: u64| u16::try_from(label).map_or(label, |label| volume.label_id(label));
-        let labels = settings.labels.into_iter().map(|(label, tables)| (id(label), tables)).collect();
-        Self { labels, ..settings }
+        Self::numbered(transfer, &|label| volume.label_id(label))
     }
 
     /// Whether more is stated than a preset.

@@ -1,7 +1,6 @@
 //! Transfer functions, from voxel values to colour and opacity (SPEC §3).
 
 use std::collections::BTreeMap;
-use std::fmt::Display;
 use std::ops::{Add, Mul};
 
 use glam::{DVec3, UVec3};
@@ -221,28 +220,25 @@ fn check_length(key: &str, count: usize, most: usize) -> Result<(), SettingError
 }
 
 /// The parts of a channel's tables that determine their pieces; `None` stands for a short ramp that is chosen from the volume.
-pub(crate) struct Parts<'a, L> {
+pub(crate) struct Parts<'a> {
     pub(crate) color: Option<&'a Ramp<DVec3>>,
     pub(crate) opacity: Option<&'a Ramp<f64>>,
     pub(crate) iso_ranges: Option<&'a [[f64; 2]]>,
-    pub(crate) labels: &'a BTreeMap<L, LabelTables>,
+    pub(crate) labels: Vec<&'a LabelTables>,
 }
 
 /// Checks that the tables of all channels have a bounded number of pieces: those of a channel count again for each label that uses them.
-pub(crate) fn check_pieces<'a, L: 'a>(
-    table: &str,
-    channels: impl Iterator<Item = Parts<'a, L>>,
-) -> Result<(), SettingError> {
+pub(crate) fn check_pieces<'a>(table: &str, channels: impl Iterator<Item = Parts<'a>>) -> Result<(), SettingError> {
     let of_opacity = |ramp: Option<&Ramp<f64>>| ramp.map_or(1, opacity_pieces);
     let of_color = |ramp: Option<&Ramp<DVec3>>| ramp.map_or(1, |ramp| ramp.points().len());
-    let of_channel = |Parts { color, opacity, iso_ranges, labels }: Parts<L>| {
+    let of_channel = |Parts { color, opacity, iso_ranges, labels }: Parts| {
         let (opacities, colors) = (of_opacity(opacity), of_color(color));
         let ends = 2 * iso_ranges.map_or(0, <[_]>::len);
         let of_label = |own: &LabelTables| {
             let opacities = own.opacity.as_ref().map_or(opacities, opacity_pieces);
             opacities + own.color.as_ref().map_or(colors, |ramp| ramp.points().len()) + ends
         };
-        let all = labels.values().map(of_label).chain([opacities + colors + ends]);
+        let all = labels.into_iter().map(of_label).chain([opacities + colors + ends]);
         all.fold(0_usize, usize::saturating_add)
     };
     let pieces = channels.map(of_channel).fold(0_usize, usize::saturating_add);
@@ -287,9 +283,15 @@ pub(crate) fn check_ramps(
     Ok(())
 }
 
-/// Checks the tables of labels.
-pub(crate) fn check_labels<L: Display>(table: &str, labels: &BTreeMap<L, LabelTables>) -> Result<(), SettingError> {
-    labels.iter().try_for_each(|(label, tables)| tables.check(&format!("{table}.label[{label}]")))
+/// Checks the tables of labels, each behind its number.
+pub(crate) fn check_labels(
+    table: &str,
+    labels: &mut dyn Iterator<Item = (u64, &LabelTables)>,
+) -> Result<(), SettingError> {
+    for (label, tables) in labels {
+        tables.check(&format!("{table}.label[{label}]"))?;
+    }
+    Ok(())
 }
 
 /// Checks that the list of intervals, if stated, is not empty, and that intervals are finite and not reversed.
@@ -327,11 +329,12 @@ impl TransferFunction {
     pub(crate) fn check_as(&self, table: &str) -> Result<(), SettingError> {
         check_ramps(table, Some(&self.color), Some(&self.opacity), self.gradient_opacity.as_ref())?;
         check_iso_ranges(table, self.iso_ranges.as_deref())?;
-        check_labels(table, &self.labels)
+        check_labels(table, &mut self.labels.iter().map(|(&label, tables)| (label.into(), tables)))
     }
 
-    fn parts(&self) -> Parts<'_, u16> {
+    fn parts(&self) -> Parts<'_> {
         let Self { color, opacity, iso_ranges, labels, .. } = self;
+        let labels = labels.values().collect();
         Parts { color: Some(color), opacity: Some(opacity), iso_ranges: iso_ranges.as_deref(), labels }
     }
 

@@ -1,6 +1,6 @@
 //! Labels as files number them: ids, whole numbers of up to 64 bits, of which a volume keeps 16 bits a voxel.
 
-use std::collections::{BTreeMap, HashMap, TryReserveError};
+use std::collections::{BTreeMap, TryReserveError};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ pub(super) struct LabelIds {
     places: Vec<u16>,
     /// The different ids in the order in which they came.
     ids: Vec<u64>,
-    place_of: HashMap<u64, u16>,
+    place_of: BTreeMap<u64, u16>,
     /// The first id for which no place was left.
     left_out: Option<u64>,
 }
@@ -36,10 +36,8 @@ impl LabelIds {
     /// # Errors
     /// If there are more different labels than 16 bits tell apart. The error names the file.
     pub(super) fn numbered(self, path: &Path) -> Result<Numbered, VolumeError> {
-        let mut ids = self.ids.clone();
-        ids.push(0);
-        ids.sort_unstable();
-        ids.dedup();
+        let no_label = (!self.place_of.contains_key(&0)).then_some(0);
+        let ids: Vec<u64> = no_label.into_iter().chain(self.place_of.keys().copied()).collect();
         if self.left_out.is_some() || ids.len() > MOST {
             let found = format!("more than {MOST} different labels");
             return Err(invalid(path, "data", found, format!("at most {MOST}, 0 among them")));
@@ -139,11 +137,6 @@ impl Voxel for u64 {
     fn bytes(_: SampleType, _: bool) -> u64 {
         size_of::<u16>() as u64
     }
-}
-
-/// What a file says of ids, by the labels that stand for them; what it says of ids that no voxel has is left out.
-pub(super) fn by_label<T>(of_ids: BTreeMap<u64, T>, ids: Option<&[u64]>) -> BTreeMap<u16, T> {
-    of_ids.into_iter().filter_map(|(id, of)| Some((label_of(id, ids)?, of))).collect()
 }
 
 /// The label that stands for an id, if any does.

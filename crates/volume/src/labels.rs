@@ -10,8 +10,8 @@ use super::access::{Access, ReadOptions};
 use super::error::volume::{invalid, refused};
 use super::format;
 use super::label_facts::LabelFacts;
-use super::label_ids::{Numbered, by_label, label_of};
-use super::loaded::{Legend, Loaded};
+use super::label_ids::{Numbered, label_of};
+use super::loaded::Loaded;
 use super::membership::{KeptMembership, Members};
 use super::resample::labels_onto;
 use super::sample_type::Sample;
@@ -73,7 +73,7 @@ struct Stated {
     labels: Labels,
     /// The numbers of the labels in the file, if these are others.
     ids: Option<Arc<[u64]>>,
-    colors: BTreeMap<u16, DVec3>,
+    colors: Vec<(f64, DVec3)>,
     /// How they lie in the patient.
     orientation: Option<Orientation>,
 }
@@ -82,12 +82,10 @@ impl Stated {
     fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
         let (_, loaded) = format::read(path, &access.wanting(Wanted::Ids))?;
         loaded.check_single(path, "one: a label for every voxel")?;
-        let Legend { names, palette, .. } = loaded.legend(access.selection().channel.unwrap_or(0) as usize, 0);
+        let legend = loaded.legend(access.selection().channel.unwrap_or(0) as usize, 0);
         let Loaded { dims, spacing, values, orientation, .. } = loaded;
         let Numbered { labels: values, ids } = values.into_ids().numbered(path)?;
-        let names = by_label(names, ids.as_deref());
-        let colors = palette.into_iter().flatten().filter_map(|(id, color)| Some((id.to_id()?, color))).collect();
-        let colors = by_label(colors, ids.as_deref());
+        let (names, colors) = (legend.label_names(ids.as_deref()), legend.label_colors(ids.as_deref()));
         let origin = path.display().to_string();
         let labels = Labels { origin, dims, spacing, values: values.into(), names };
         Ok(Self { labels, ids, colors, orientation })
@@ -208,7 +206,7 @@ impl Volume {
         self.membership[Members::OfLabels as usize] = KeptMembership::default();
         self.label_names = names;
         self.label_ids = None;
-        self.label_colors = BTreeMap::new();
+        self.label_colors = Vec::new();
         Ok(self)
     }
 
@@ -238,8 +236,8 @@ impl Volume {
         label_of(id, self.label_ids())
     }
 
-    /// The colours (red, green and blue in [0, 1]) that the file of a segmented volume's labels states for them.
-    pub fn label_colors(&self) -> &BTreeMap<u16, DVec3> {
+    /// The colours (red, green and blue in [0, 1]) that the file of a segmented volume's labels states for them, in ascending order of labels.
+    pub fn label_colors(&self) -> &[(f64, DVec3)] {
         &self.label_colors
     }
 

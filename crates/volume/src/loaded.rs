@@ -7,8 +7,8 @@ use glam::{DVec3, UVec3};
 
 use super::display::ChannelDisplay;
 use super::error::volume::invalid;
-use super::label_ids::by_label;
-use super::sample_type::SampleType;
+use super::label_ids::label_of;
+use super::sample_type::{Sample, SampleType};
 use super::series::Series;
 use super::voxels::Voxels;
 use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
@@ -56,8 +56,8 @@ pub(super) struct Loaded {
 /// The names and colours that a file gives to single values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Legend {
-    /// The names of labels, by their ids.
-    pub(super) names: BTreeMap<u64, String>,
+    /// The names of labels, each behind its id.
+    pub(super) names: Vec<(u64, String)>,
     /// Their colours, in ascending order of values.
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
     /// Whether the file says that all values are labels, with or without names.
@@ -65,6 +65,31 @@ pub(super) struct Legend {
 }
 
 impl Legend {
+    /// The names of labels, given what these are, in ascending order, if ids are others.
+    pub(super) fn label_names(&self, ids: Option<&[u64]>) -> BTreeMap<u16, String> {
+        let mut names = BTreeMap::new();
+        // Of two names the first one stays, as of two colours.
+        for (id, name) in self.names.iter().rev() {
+            if let Some(label) = label_of(*id, ids) {
+                names.insert(label, name.clone());
+            }
+        }
+        names
+    }
+
+    /// The colours of labels, in ascending order.
+    pub(super) fn label_colors(&self, ids: Option<&[u64]>) -> Vec<(f64, DVec3)> {
+        let palette = self.palette.iter().flatten();
+        palette.filter_map(|&(id, color)| Some((label_of(id.to_id()?, ids)?.into(), color))).collect()
+    }
+
+    /// Colours in ascending order of values, the first one of each; `None` without any.
+    pub(super) fn ascending(mut colors: Vec<(f64, DVec3)>) -> Option<Vec<(f64, DVec3)>> {
+        colors.sort_by(|a, b| a.0.total_cmp(&b.0));
+        colors.dedup_by_key(|color| color.0);
+        Some(colors).filter(|colors| !colors.is_empty())
+    }
+
     /// Colours of values without names.
     #[cfg(any(feature = "dicom", feature = "tiff"))]
     pub(super) fn of_palette(palette: Option<Vec<(f64, DVec3)>>) -> Self {
@@ -114,8 +139,9 @@ impl Loaded {
     /// The facts that the file, of some format, states about one of its channels, `number` among those that are read. The first channel has the facts that concern all.
     pub(super) fn facts(&self, format: &'static str, channel: usize, number: usize) -> StoreFacts {
         let Self { series, spacing, unit, .. } = self;
-        let Legend { names, palette, are_labels } = self.legend(channel, number);
-        let label_names = by_label(names, None);
+        let legend = self.legend(channel, number);
+        let label_names = legend.label_names(None);
+        let Legend { palette, are_labels, .. } = legend;
         let orientation = self.orientation.filter(|_| number == 0);
         let channels = if series.is_color { 1 } else { series.channels };
         let display = self.displays.get(channel).filter(|display| **display != ChannelDisplay::default());

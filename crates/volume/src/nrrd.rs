@@ -289,9 +289,8 @@ impl Header {
             Some(DVec3::new(red, green, blue))
                 .filter(|color| color.cmpge(DVec3::ZERO).all() && color.cmple(DVec3::ONE).all())
         };
-        let colors: BTreeMap<u64, DVec3> =
-            self.segments("_Color", layer).filter_map(|(label, text)| Some((label, color(text)?))).collect();
-        (!colors.is_empty()).then(|| colors.into_iter().map(|(label, color)| (label as f64, color)).collect())
+        let colors = self.segments("_Color", layer).filter_map(|(label, text)| Some((label as f64, color(text)?)));
+        Legend::ascending(colors.collect())
     }
 
     /// The labels of the segments of a layer, or of all, and what is said of each by a key with some end.

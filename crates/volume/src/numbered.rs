@@ -10,9 +10,8 @@ use super::access::Access;
 use super::borders::are_sharp;
 use super::error::volume::VolumeError;
 use super::format;
-use super::label_ids::{Numbered, by_label};
+use super::label_ids::Numbered;
 use super::loaded::{Legend, Loaded};
-use super::sample_type::Sample;
 use super::value_slice::ValueSlice;
 use super::voxels::Wanted;
 use super::{Values, Volume};
@@ -70,11 +69,8 @@ impl Volume {
         if !(are_stated || is_enough && are_sharp(&pieces, background.into())) {
             return None;
         }
-        let names = by_label(legend.names.clone(), ids.as_deref());
-        let colors = legend.palette.iter().flatten().filter_map(|&(id, color)| Some((id.to_id()?, color))).collect();
-        let palette: Vec<_> =
-            by_label(colors, ids.as_deref()).into_iter().map(|(label, color)| (f64::from(label), color)).collect();
-        let palette = Some(palette).filter(|palette| !palette.is_empty());
+        let names = legend.label_names(ids.as_deref());
+        let palette = Some(legend.label_colors(ids.as_deref())).filter(|palette| !palette.is_empty());
         Some(NumberedValues { values: pieces.values, ids, names, palette })
     }
 

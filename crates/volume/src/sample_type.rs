@@ -60,10 +60,11 @@ macro_rules! primitive_samples {
             }
 
             fn to_id(self) -> Option<u64> {
-                const END: f64 = 18_446_744_073_709_551_616.0;
-                let (id, near) = (self as u64, self as f64);
-                let is_in_range = near >= 0.0 && (Self::IS_WHOLE || near < END);
-                (is_in_range && id as $type == self).then_some(id)
+                // Every other type has a double for each of its numbers.
+                if Self::IS_WHOLE && size_of::<$type>() == 8 {
+                    return (self as f64 >= 0.0).then_some(self as u64);
+                }
+                id_of(self as f64)
             }
 
             const IS_WHOLE: bool = 0.5_f64 as $type as f64 == 0.0;
@@ -75,6 +76,13 @@ macro_rules! primitive_samples {
             }
         })*
     };
+}
+
+/// The whole number from 0 on that a double is, if it is one.
+fn id_of(value: f64) -> Option<u64> {
+    const END: f64 = 18_446_744_073_709_551_616.0;
+    let id = value as u64;
+    ((0.0..END).contains(&value) && id as f64 == value).then_some(id)
 }
 
 sample_types!(

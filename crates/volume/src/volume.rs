@@ -38,7 +38,7 @@ pub struct Volume {
     pub(super) labels: Option<Arc<[u16]>>,
     pub(super) label_names: BTreeMap<u16, String>,
     /// The colours of a segmented volume's labels, where its file states them.
-    pub(super) label_colors: BTreeMap<u16, DVec3>,
+    pub(super) label_colors: Vec<(f64, DVec3)>,
     /// The file's numbers of labels, which are the values or those of a segmented volume; `None` if they are the labels themselves.
     pub(super) label_ids: Option<Arc<[u64]>>,
     /// Whether the values are known to be labels.
@@ -171,7 +171,7 @@ impl Volume {
             colors: None,
             labels: None,
             label_names: BTreeMap::new(),
-            label_colors: BTreeMap::new(),
+            label_colors: Vec::new(),
             label_ids: None,
             is_label_map: false,
             assumed_axes: None,

@@ -257,7 +257,7 @@ impl<'a> Slices<'a> {
             });
             DVec3::new(x, y, z)
         });
-        let palette = self.palette.map(|colors| values_of(&colors, self.rescale)).filter(|palette| !palette.is_empty());
+        let palette = self.palette.and_then(|colors| values_of(&colors, self.rescale));
         let unit = calibration.unit.clone();
         let (channel_names, displays) = (calibration.channel_names.clone(), calibration.displays.clone());
         let legends = vec![Legend::of_palette(palette)];
@@ -266,16 +266,13 @@ impl<'a> Slices<'a> {
 }
 
 /// The colours of the values that a palette's indices become, in ascending order.
-fn values_of(colors: &[[u8; 3]], rescale: Option<[f64; 2]>) -> Vec<(f64, DVec3)> {
+fn values_of(colors: &[[u8; 3]], rescale: Option<[f64; 2]>) -> Option<Vec<(f64, DVec3)>> {
     let [slope, intercept] = rescale.unwrap_or([1.0, 0.0]);
     let rgb = |color: [u8; 3]| DVec3::from(color.map(|channel| f64::from(channel) / 255.0));
     // Volumes store values as f32.
     let value = |index: usize| f64::from((index as f64 * slope + intercept) as f32);
-    let mut points: Vec<_> = colors.iter().enumerate().map(|(index, &color)| (value(index), rgb(color))).collect();
-    points.retain(|(value, _)| value.is_finite());
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    points.dedup_by_key(|point| point.0);
-    points
+    let points = colors.iter().enumerate().map(|(index, &color)| (value(index), rgb(color)));
+    Legend::ascending(points.filter(|(value, _)| value.is_finite()).collect())
 }
 
 #[cfg(test)]

@@ -1,7 +1,5 @@
 //! How an image's channels are shown, and what labels mean.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 
 use super::super::loaded::Legend;
@@ -53,12 +51,10 @@ pub(super) fn labels(image_label: &Json) -> Legend {
     let color = |label: &Json| {
         let numbers: Vec<f64> = label.get("rgba").members().iter().filter_map(Json::number).collect();
         let &[red, green, blue, ..] = numbers.as_slice() else { return None };
-        Some((value(label)?, DVec3::new(red, green, blue).clamp(DVec3::ZERO, DVec3::splat(255.0)) / 255.0))
+        Some((value(label)? as f64, DVec3::new(red, green, blue).clamp(DVec3::ZERO, DVec3::splat(255.0)) / 255.0))
     };
     let names = image_label.get("properties").members().iter().filter_map(name).collect();
-    let colors: BTreeMap<u64, DVec3> = image_label.get("colors").members().iter().filter_map(color).collect();
-    let palette: Vec<_> = colors.into_iter().map(|(value, color)| (value as f64, color)).collect();
-    let palette = Some(palette).filter(|palette| !palette.is_empty());
+    let palette = Legend::ascending(image_label.get("colors").members().iter().filter_map(color).collect());
     Legend { names, palette, are_labels: image_label.is_some() }
 }
 

@@ -107,7 +107,7 @@ fn labels_beside_values_keep_their_ids() {
         let expected: Vec<u16> = (0..144).map(|index| region(index) as u16).collect();
         assert_eq!(volume.labels(), Some(&expected[..]), "{kind}");
         assert_eq!(volume.label_names().get(&1).map(String::as_str), Some("root"));
-        assert_eq!(volume.label_colors().get(&1), Some(&DVec3::Z));
+        assert_eq!(volume.label_colors(), [(1.0, DVec3::Z)]);
         let allowed = "labels, whole numbers from 0 to 65535";
         let message = Labels::open(&path).unwrap_err().to_string();
         assert!(
