@@ -16,14 +16,14 @@ mod groups;
 mod image;
 mod marks;
 mod palette;
+mod segmentation;
+mod segments;
 mod series;
 mod stacks;
 mod table;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-
-use glam::DMat3;
 
 use self::frames::Assumed;
 use self::groups::{Chosen, Slice};
@@ -35,7 +35,7 @@ use super::access::Access;
 use super::error::volume::invalid;
 use super::grid::{SIZES, dims_of};
 use super::loaded::{Legend, Loaded};
-use super::orientation::{Orientation, RAS_FROM_LPS};
+use super::orientation::Orientation;
 use super::samples::Samples;
 use super::series::apart;
 use crate::parallel;
@@ -47,7 +47,7 @@ pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> 
         return Err(invalid(path, "PixelData", "no such element", "an image"));
     };
     let chosen = groups::choose(path, vec![opened], access)?;
-    if chosen.slices.len() == 1 {
+    if chosen.slices.len() == 1 && chosen.segments().is_none() {
         log::warn!("{}: one slice; a folder with all slices of a series is read as one volume", path.display());
     }
     assemble(path, chosen, access)
@@ -61,6 +61,9 @@ pub(super) fn read_folder(folder: &Path, files: &[PathBuf], access: &Access) -> 
 }
 
 fn assemble(path: &Path, chosen: Chosen, access: &Access) -> Result<Loaded, VolumeError> {
+    if chosen.segments().is_some() {
+        return segmentation::assemble(path, chosen, access);
+    }
     let Chosen { images, slices, listed } = chosen;
     let Series { stacks, lattice, even } = Series::of(path, &images, slices, access)?;
     let count = stacks.stacks[0].len();
@@ -126,8 +129,7 @@ fn assemble(path: &Path, chosen: Chosen, access: &Access) -> Result<Loaded, Volu
         let (path, elements, z) = (path.display(), assumed.names(), lattice.spacing.z);
         log::warn!("{path}: no {elements}: frames are taken to be stacked {z} apart");
     }
-    let origin = RAS_FROM_LPS * origin;
-    let orientation = Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * lattice.axes, origin };
+    let orientation = Orientation::of_lps(lattice.axes, origin);
     let orientation = Some(orientation).filter(|_| matches!(first.assumed, None | Some(Assumed::Steps)));
     let unit = Some("mm".to_owned()).filter(|_| first.assumed != Some(Assumed::Grid));
     let types: BTreeSet<&str> = all_read()
