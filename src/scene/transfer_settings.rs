@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::label_ramps::{by_id, by_place};
 use crate::appearance::{Colormap, Preset};
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::Volume;
@@ -16,7 +17,8 @@ pub struct TransferSettings {
     pub preset: Option<Preset>,
     /// The colour map over the visible values, used if `color` is `None`.
     pub colormap: Option<Colormap>,
-    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the volume.
+    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the volume. Where values are places of labels in the file ([`Volume::label_ids`]),
+    /// this, the opacity and the iso-ranges are over the file's numbers.
     pub color: Option<Ramp<DVec3>>,
     /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen from the volume.
     pub opacity: Option<Ramp<f64>>,
@@ -53,7 +55,7 @@ impl TransferSettings {
     /// Settings that state everything about a volume's own channel, with labels by their numbers in its file.
     #[doc(hidden)]
     pub fn stating(transfer: TransferFunction, volume: &Volume) -> Self {
-        Self::numbered(transfer, &|label| volume.label_id(label))
+        Self::numbered(by_id(transfer, volume), &|label| volume.label_id(label))
     }
 
     /// Whether more is stated than a preset.
@@ -102,10 +104,12 @@ impl TransferSettings {
             };
             transfer.labels.insert(label, tables);
         }
-        match (&self.color, self.colormap) {
-            (Some(color), _) => transfer.color = color.clone(),
-            (None, Some(map)) => transfer.color = map.of(volume, &transfer).unwrap_or(transfer.color),
-            (None, None) => {}
+        if let Some(color) = &self.color {
+            transfer.color = color.clone();
+        }
+        let mut transfer = by_place(transfer, volume, [self.color.is_some(), self.opacity.is_some()]);
+        if let (None, Some(map)) = (&self.color, self.colormap) {
+            transfer.color = map.of(volume, &transfer).unwrap_or(transfer.color);
         }
         transfer
     }
