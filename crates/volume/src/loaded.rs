@@ -77,6 +77,11 @@ impl Legend {
         names
     }
 
+    /// Whether values are labels.
+    pub(super) fn is_of_labels(&self) -> bool {
+        self.are_labels || !self.names.is_empty()
+    }
+
     /// The colours of labels, in ascending order.
     pub(super) fn label_colors(&self, ids: Option<&[u64]>) -> Vec<(f64, DVec3)> {
         let palette = self.palette.iter().flatten();

@@ -39,7 +39,7 @@ impl Volume {
         legend: &Legend,
         access: &Access,
     ) -> Option<NumberedValues> {
-        let are_stated = legend.are_labels || !legend.names.is_empty();
+        let are_stated = legend.is_of_labels();
         let numbered = match Self::numbers_of(path, access) {
             Ok(numbered) => numbered,
             Err(error) if are_stated => {

@@ -14,7 +14,7 @@ use super::VolumeError;
 use super::access::Access;
 use super::error::volume::invalid;
 use super::grid::dims_of;
-use super::loaded::Loaded;
+use super::loaded::{Legend, Loaded};
 use super::orientation::{MAX_COSINE, lengths_and_directions};
 use super::voxel::{Many, Voxel};
 use super::voxels::Voxels;
@@ -145,9 +145,15 @@ impl Lattice {
             path.display()
         );
         let first = DVec3::from_array(ranges.map(|[first, _]| first));
+        let is_nearest = loaded.legends.iter().any(Legend::is_of_labels);
+        let from = loaded.dims;
         let values = match &loaded.values {
-            Voxels::Values(values) => shear.resampled::<f32>((values, loaded.dims), (first, dims)).map(Voxels::from),
-            Voxels::Ids(ids) => shear.resampled::<u64>((ids, loaded.dims), (first, dims)).map(Voxels::from),
+            Voxels::Values(values) => {
+                shear.resampled(&Samples::<f32> { dims: from, values, is_nearest }, first, dims).map(Voxels::from)
+            }
+            Voxels::Ids(values) => {
+                shear.resampled(&Samples::<u64> { dims: from, values, is_nearest }, first, dims).map(Voxels::from)
+            }
         };
         let values = values.map_err(|error| too_many(format!("an orthogonal grid of {dims} voxels: {error}")))?;
         let mut orientation = loaded.orientation;
@@ -171,13 +177,13 @@ impl Shear {
     /// If there is no memory for them.
     fn resampled<T: Voxel>(
         &self,
-        (from, dims_from): (&T::Many, UVec3),
-        (first, dims): (DVec3, UVec3),
+        source: &Samples<'_, T>,
+        first: DVec3,
+        dims: UVec3,
     ) -> Result<T::Many, TryReserveError> {
         let mut values = Vec::new();
         values.try_reserve_exact(dims.element_product() as usize)?;
         values.resize(dims.element_product() as usize, T::HOLE);
-        let source = Samples::<T> { dims: dims_from, values: from };
         let rows = values.par_chunks_mut(dims.x as usize).enumerate();
         rows.for_each(|(row, values)| {
             let (y, z) = (row as u32 % dims.y, row as u32 / dims.y);
@@ -223,6 +229,8 @@ impl Shear {
 struct Samples<'a, T: Voxel> {
     dims: UVec3,
     values: &'a T::Many,
+    /// Whether places between samples have the nearest one.
+    is_nearest: bool,
 }
 
 impl<T: Voxel> Samples<'_, T> {
@@ -233,12 +241,15 @@ impl<T: Voxel> Samples<'_, T> {
         let (i, i_part) = cell(place[a], self.dims[a])?;
         let (j, j_part) = cell(place[b], self.dims[b])?;
         let sample = |i: usize, j: usize| self.values.at(plane + i * strides[a] + j * strides[b]);
+        let behind = |part: f64| usize::from(part >= 0.5);
         let row = |j: usize| match i_part {
             0.0 => sample(i, j),
+            part if self.is_nearest => sample(i + behind(part), j),
             part => sample(i, j).between(sample(i + 1, j), part),
         };
         Some(match j_part {
             0.0 => row(j),
+            part if self.is_nearest => row(j + behind(part)),
             part => row(j).between(row(j + 1), part),
         })
     }
@@ -378,6 +389,19 @@ mod tests {
         // Of two sheared axes the later one moves.
         let skew = [DVec3::X, DVec3::new(0.5, 3.0, 0.0), DVec3::Z];
         assert_eq!(Lattice::of(skew).unwrap().shear.unwrap().order, [0, 2, 1]);
+    }
+
+    /// As [`labels_are_the_nearest_ones_and_holes_spread`] has them.
+    #[test]
+    fn values_that_the_file_calls_labels_are_the_nearest_ones() {
+        let lattice = Lattice::of([DVec3::X, DVec3::Y, DVec3::new(0.25, 0.0, 1.0)]).unwrap();
+        let access = Access::new(&ReadOptions::default()).unwrap();
+        let values: Vec<f32> = (1..10).map(|label| label as f32).collect();
+        let legends = vec![Legend { are_labels: true, ..Legend::default() }];
+        let loaded = Loaded { legends, ..loaded(UVec3::new(3, 1, 3), &lattice, DVec3::ZERO, values) };
+        let straight = lattice.straighten(Path::new("here"), "axes", loaded, &access).unwrap();
+        let found = straight.values.values().iter().map(|value| if value.is_nan() { 0.0 } else { value });
+        assert!(found.eq([1.0, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, 0.0, 7.0, 8.0, 9.0, 9.0]));
     }
 
     #[test]
