@@ -8,9 +8,8 @@ use super::values::Values;
 use super::voxel::{Many, Voxel};
 
 /// The numbers that a file's samples become.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Wanted {
-    #[default]
     Values,
     /// Ids of labels.
     Ids,
