@@ -71,8 +71,8 @@ pub fn color(label: u16) -> DVec3 {
     (oklch(LIGHTNESS[usize::from((label % 3 + label / 21 % 3) % 3)], 0.274, hue) * 1e3).round() / 1e3
 }
 
-/// A label map's transfer function, by the colours that its file states or else [`color()`]. Each colour is at its label's number, so no voxel has a colour in
-/// between.
+/// A label map's transfer function, by the colours that its file states, in ascending order of values, or else [`color()`]. Each colour is at its label's
+/// number, so no voxel has a colour in between.
 pub fn transfer(labels: &[u16], palette: &[(f64, DVec3)]) -> TransferFunction {
     transfer_by(labels, palette, color)
 }

@@ -3,8 +3,8 @@
 use super::Volume;
 use crate::parallel::prelude::*;
 
-/// Whether regions of a volume have sharp borders, as those of labels do. Of the voxels whose neighbours on an axis differ, at most a third have a value that
-/// differs from both; in images most do. Of the pairs of neighbours that are not background, at least half are equal.
+/// Whether regions of a volume have sharp borders, as those of labels do. Where a voxel's neighbours on an axis differ, it has a
+/// third value in at most a third of all cases; in images mostly. At least half of the pairs of neighbours that are not background are equal.
 pub fn are_sharp(volume: &Volume, background: f32) -> bool {
     Borders::of(volume, background).are_sharp()
 }

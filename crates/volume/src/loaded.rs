@@ -68,7 +68,7 @@ impl Legend {
     /// The names of labels, given what these are, in ascending order, if ids are others.
     pub(super) fn label_names(&self, ids: Option<&[u64]>) -> BTreeMap<u16, String> {
         let mut names = BTreeMap::new();
-        // Of two names the first one stays, as of two colours.
+        // The first one of two names stays, as with colours.
         for (id, name) in self.names.iter().rev() {
             if let Some(label) = label_of(*id, ids) {
                 names.insert(label, name.clone());

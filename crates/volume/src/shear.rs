@@ -391,7 +391,7 @@ mod tests {
         assert_eq!(Lattice::of(skew).unwrap().shear.unwrap().order, [0, 2, 1]);
     }
 
-    /// As [`labels_are_the_nearest_ones_and_holes_spread`] has them.
+    /// The right ones are those of [`labels_are_the_nearest_ones_and_holes_spread`].
     #[test]
     fn values_that_the_file_calls_labels_are_the_nearest_ones() {
         let lattice = Lattice::of([DVec3::X, DVec3::Y, DVec3::new(0.25, 0.0, 1.0)]).unwrap();

@@ -71,7 +71,7 @@ fn ramps_of_label_maps_are_over_their_numbers_in_the_file() {
     // No number of the file lies there.
     let nowhere = parse("volume.path = 'labels.nrrd'\ntransfer.iso_ranges = [[5, 6]]").resolve(&volume);
     assert!((0..4).all(|place| !nowhere.tables(None).in_iso_range(f64::from(place))));
-    // What a scene leaves open is chosen over places.
+    // Ramps that a scene leaves open are chosen over places.
     let chosen = parse("volume.path = 'labels.nrrd'");
     let colors = [1, 2].map(|place| chosen.resolve(&volume).color.at(f64::from(place)));
     assert_eq!(colors, [70_000, 312_782_547].map(|id| categories::color((id % 65_521) as u16)));

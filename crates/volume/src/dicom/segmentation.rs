@@ -278,7 +278,7 @@ mod tests {
         // Two frames of the first slice; the stated distance tells how many slices no frame names.
         assert_eq!(step(&[0.0, 0.0, 6.0, 9.0], None), Ok(Some(3.0)));
         assert_eq!(step(&[0.0, 0.0, 6.0, 9.0], Some(1.5)), Ok(Some(1.5)));
-        // It may be rounded, or not fit at all.
+        // The stated distance may be rounded, or not fit at all.
         assert_eq!(step(&[0.0, 6.25, 9.375], Some(3.1)), Ok(Some(3.125)));
         assert_eq!(step(&[0.0, 6.0, 9.0], Some(4.0)), Ok(Some(3.0)));
         assert_eq!((step(&[0.0, 0.0], Some(4.0)), step(&[0.0], None)), (Ok(Some(4.0)), Ok(None)));

@@ -1,5 +1,5 @@
-//! Segmentations as highdicom writes and reads them: `highdicom.seg.segread(FILE).get_volume()`. Of the scan's seven slices the first, the fourth and the
-//! last lie in no segment, so that no frame names them.
+//! Segmentations as highdicom writes and reads them: `highdicom.seg.segread(FILE).get_volume()`. The first, the fourth and the last of the scan's seven
+//! slices lie in no segment, so that no frame names them.
 
 use std::collections::BTreeMap;
 
