@@ -26,6 +26,8 @@ pub struct Pick {
     pub value: f32,
     /// That voxel's label, if the channel is segmented.
     pub label: Option<u16>,
+    /// The number in the file ([`Volume::label_ids`]) of that label, or of the value where values are labels beyond 16 bits.
+    pub label_id: Option<u64>,
 }
 
 impl Pick {
@@ -56,7 +58,10 @@ impl Pick {
         let (channel, _) = opacities.fold((0, 0.0), |best, of| if of.1 > best.1 { of } else { best });
         let of_channel = volume.channel(channel).unwrap_or(volume);
         let (value, label) = (of_channel.values().at(index as usize), of_channel.label(index));
-        Self { position, depth, voxel: grid.file_voxel(voxel), channel, value, label }
+        // Values of such files are labels.
+        let of_value = || of_channel.label_ids().map(|_| value as u16);
+        let label_id = label.or_else(of_value).map(|label| of_channel.label_id(label));
+        Self { position, depth, voxel: grid.file_voxel(voxel), channel, value, label, label_id }
     }
 
     /// The error of a pick without a first hit: none were requested, or the pixel lies outside the image.

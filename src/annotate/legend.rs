@@ -95,7 +95,10 @@ fn entry(volume: &Volume, transfer: &TransferFunction, label: u16, values: [f64;
     let place = |x: u32| f64::from(x) / f64::from(COLORS - 1);
     let colors = (0..COLORS).map(|x| table.color.at(values[0] * (1.0 - place(x)) + values[1] * place(x)));
     let name = volume.label_names().get(&label).map_or_else(String::new, |name| format!(" {name}"));
-    Entry { text: format!("{label}{name}"), colors: colors.map(|rgb| rgb.as_vec3().extend(1.0).to_array()).collect() }
+    Entry {
+        text: format!("{}{name}", volume.label_id(label)),
+        colors: colors.map(|rgb| rgb.as_vec3().extend(1.0).to_array()).collect(),
+    }
 }
 
 fn entries(volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, SettingError> {

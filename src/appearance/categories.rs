@@ -6,9 +6,10 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::quantile::histogram;
+#[cfg(not(target_arch = "wasm32"))]
 use crate::parallel::prelude::*;
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
-use crate::volume::Volume;
+use crate::volume::{Volume, are_sharp};
 
 /// The opacity of every label except 0.
 const OPACITY: f64 = 0.9;
@@ -56,70 +57,7 @@ pub fn is_label_map(volume: &Volume) -> bool {
     }
     // The lowest of the most frequent values.
     let background = counts.iter().rev().max_by_key(|(_, count)| count).map_or(0.0, |&(label, _)| f32::from(label));
-    volume.label_facts().has_sharp_borders(|| Borders::of(volume, background).are_sharp())
-}
-
-/// The maximum number of rows that are examined, and their distance.
-const MOST_ROWS: u64 = 8192;
-const PRIME: u64 = 1_000_003;
-
-/// Counts of how values change between neighbours along the axes.
-#[derive(Clone, Copy, Default)]
-struct Borders {
-    /// Voxels between two different values, and those of them that have a third value.
-    between: [u64; 2],
-    /// Pairs of neighbours that are not both background, and the equal ones among them.
-    pairs: [u64; 2],
-}
-
-impl Borders {
-    /// Counts in a sample of the volume's rows.
-    fn of(volume: &Volume, background: f32) -> Self {
-        let (dims, values) = (volume.dims(), volume.values());
-        let [nx, ny, nz] = dims.to_array().map(|n| n as usize);
-        let steps = [(1, nx), (nx, ny), (nx * ny, nz)];
-        let row = |row: usize| {
-            let mut borders = Self::default();
-            for x in 0..nx {
-                let at = row * nx + x;
-                if values.at(at).is_nan() {
-                    continue;
-                }
-                for ((step, count), place) in steps.into_iter().zip([x, row % ny, row / ny]) {
-                    if place + 1 == count {
-                        continue;
-                    }
-                    let [here, next] = [values.at(at), values.at(at + step)];
-                    if next.is_nan() {
-                        continue;
-                    }
-                    if here != background || next != background {
-                        borders.pairs[0] += 1;
-                        borders.pairs[1] += u64::from(here == next);
-                    }
-                    if place > 0 && !values.at(at - step).is_nan() && values.at(at - step) != next {
-                        borders.between[0] += 1;
-                        borders.between[1] += u64::from(here != next && here != values.at(at - step));
-                    }
-                }
-            }
-            borders
-        };
-        // The distance is prime, so that the rows are spread over the volume.
-        let rows = (ny * nz) as u64;
-        let place = |at: u64| if rows > MOST_ROWS { at * PRIME % rows } else { at };
-        let looked_at = (0..rows.min(MOST_ROWS)).into_par_iter().map(|at| place(at) as usize);
-        looked_at.map(row).reduce(Self::default, Self::and)
-    }
-
-    fn and(self, other: Self) -> Self {
-        let sum = |a: [u64; 2], b: [u64; 2]| [a[0] + b[0], a[1] + b[1]];
-        Self { between: sum(self.between, other.between), pairs: sum(self.pairs, other.pairs) }
-    }
-
-    fn are_sharp(&self) -> bool {
-        3 * self.between[1] <= self.between[0] && 2 * self.pairs[1] >= self.pairs[0]
-    }
+    volume.label_facts().has_sharp_borders(|| are_sharp(volume, background))
 }
 
 /// A label's colour (red, green and blue in [0, 1]), the same in every volume. Hues advance by the golden angle, so that neighbours in number are far
@@ -133,23 +71,61 @@ pub fn color(label: u16) -> DVec3 {
     (oklch(LIGHTNESS[usize::from((label % 3 + label / 21 % 3) % 3)], 0.274, hue) * 1e3).round() / 1e3
 }
 
-/// A label map's transfer function, by the colours that its file states or else [`color()`]. Each colour is at its label's number, so no voxel has a colour in
-/// between.
+/// A label map's transfer function, by the colours that its file states, in ascending order of values, or else [`color()`]. Each colour is at its label's
+/// number, so no voxel has a colour in between.
 pub fn transfer(labels: &[u16], palette: &[(f64, DVec3)]) -> TransferFunction {
-    let stated = |label: f64| palette.iter().find(|(value, _)| *value == label).map(|(_, color)| *color);
-    let of = |label: u16| (f64::from(label), stated(label.into()).unwrap_or_else(|| color(label)));
+    transfer_by(labels, palette, color)
+}
+
+/// [`transfer`] for the labels of a volume, by their numbers in its file.
+pub(crate) fn transfer_of(volume: &Volume, labels: &[u16], palette: &[(f64, DVec3)]) -> TransferFunction {
+    transfer_by(labels, palette, |label| color_of(volume, label))
+}
+
+fn transfer_by(labels: &[u16], palette: &[(f64, DVec3)], color: impl Fn(u16) -> DVec3) -> TransferFunction {
+    let of = |label: u16| (f64::from(label), stated_color(palette, label).unwrap_or_else(|| color(label)));
     let shown: Vec<_> = labels.iter().filter(|&&label| label > 0).map(|&label| of(label)).collect();
     let shown = if shown.is_empty() { vec![(0.0, DVec3::ONE)] } else { shown };
     TransferFunction::by_value(Ramp::through(shown), Ramp::through(vec![(0.0, 0.0), (1.0, OPACITY)]))
 }
 
+/// The colour that a file states for a label, given its colours in ascending order of values.
+fn stated_color(palette: &[(f64, DVec3)], label: u16) -> Option<DVec3> {
+    let at = palette.binary_search_by(|(value, _)| value.total_cmp(&label.into())).ok()?;
+    Some(palette[at].1)
+}
+
 /// Tables with the same colours for the labels of a segmented volume, whose opacities depend on its values. Label 0 is hidden.
 pub fn tables(labels: &[u16]) -> BTreeMap<u16, LabelTables> {
+    tables_by(labels, color)
+}
+
+/// [`tables`] for the labels of a volume, with the colours that their file states, or else by their numbers in it.
+pub(crate) fn tables_of(volume: &Volume, labels: &[u16]) -> BTreeMap<u16, LabelTables> {
+    let stated = volume.label_colors();
+    tables_by(labels, |label| stated_color(stated, label).unwrap_or_else(|| color_of(volume, label)))
+}
+
+fn tables_by(labels: &[u16], color: impl Fn(u16) -> DVec3) -> BTreeMap<u16, LabelTables> {
     let table = |label: u16| {
         let color = Some(Ramp::through(vec![(0.0, color(label))]));
         LabelTables { visible: label > 0, color, ..LabelTables::default() }
     };
-    distinct(labels).into_iter().map(|label| (label, table(label))).collect()
+    let mut tables = BTreeMap::new();
+    for label in distinct(labels) {
+        tables.insert(label, table(label));
+    }
+    tables
+}
+
+/// A label's colour by its number in the file, the same in every volume. Numbers beyond 16 bits share colours with others.
+fn color_of(volume: &Volume, label: u16) -> DVec3 {
+    /// The largest prime of 16 bits, so that numbers in regular steps have different colours.
+    const PRIME: u64 = 65_521;
+    match volume.label_id(label) {
+        id if id > u64::from(u16::MAX) => color((id % PRIME) as u16),
+        id => color(id as u16),
+    }
 }
 
 /// The sRGB colour for lightness, chroma and hue in Ottosson's Oklab, with less chroma if it is outside the gamut.

@@ -36,7 +36,7 @@ impl TransferFunction {
         let labels = categories::is_label_map(volume).then(|| categories::values(volume)).flatten();
         labels.map_or_else(
             || surface(volume),
-            |labels| categories::transfer(&labels, volume.palette().unwrap_or_default()),
+            |labels| categories::transfer_of(volume, &labels, volume.palette().unwrap_or_default()),
         )
     }
 }
@@ -59,7 +59,7 @@ pub(crate) fn one_of_several(volume: &Volume) -> TransferFunction {
 
 /// The transfer function of a label map among several channels: its labels' colours, under [`Preset::Fusion`] translucent.
 pub(crate) fn labels_of_several(volume: &Volume, preset: Option<Preset>) -> TransferFunction {
-    let labels = categories::transfer(&categories::values(volume).unwrap_or_default(), &[]);
+    let labels = categories::transfer_of(volume, &categories::values(volume).unwrap_or_default(), &[]);
     match preset {
         Some(Preset::Fusion) => TransferFunction { opacity: preset::translucent_labels(), ..labels },
         _ => labels,

@@ -284,11 +284,10 @@ fn haze(volume: &Volume, opacity: impl Fn([f64; 2]) -> f64) -> TransferFunction 
 fn labels(volume: &Volume) -> Option<TransferFunction> {
     match volume.labels() {
         Some(labels) => {
-            let labels = categories::tables(labels);
+            let labels = categories::tables_of(volume, labels);
             Some(TransferFunction { labels, ..TransferFunction::from_histogram(volume) })
         }
-        None => {
-            categories::values(volume).map(|labels| categories::transfer(&labels, volume.palette().unwrap_or_default()))
-        }
+        None => categories::values(volume)
+            .map(|labels| categories::transfer_of(volume, &labels, volume.palette().unwrap_or_default())),
     }
 }

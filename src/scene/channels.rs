@@ -129,7 +129,10 @@ impl Scene {
             // The preset that declares values to be labels stays, because their looks may not tell.
             let preset =
                 settings.transfer.preset.filter(|preset| *preset == Preset::Labels && channel.labels().is_none());
-            let transfer = TransferSettings { preset, ..self.transfer_of(number, volume, channel).into() };
+            let transfer = TransferSettings {
+                preset,
+                ..TransferSettings::stating(self.transfer_of(number, volume, channel), channel)
+            };
             Channel { name, transfer, ..settings }
         };
         (0..).zip(volume.channels()).map(channel).collect()

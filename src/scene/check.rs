@@ -40,12 +40,13 @@ impl TransferSettings {
     pub(super) fn check_as(&self, table: &str) -> Result<(), SettingError> {
         check_ramps(table, self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())?;
         check_iso_ranges(table, self.iso_ranges.as_deref())?;
-        check_labels(table, &self.labels)
+        check_labels(table, &mut self.labels.iter().map(|(&label, tables)| (label, tables)))
     }
 
     fn parts(&self) -> Parts<'_> {
         let (color, opacity) = (self.color.as_ref(), self.opacity.as_ref());
-        Parts { color, opacity, iso_ranges: self.iso_ranges.as_deref(), labels: &self.labels }
+        let labels = self.labels.values().collect();
+        Parts { color, opacity, iso_ranges: self.iso_ranges.as_deref(), labels }
     }
 
     /// Checks that the volume has the labels or palette that the settings need.

@@ -8,6 +8,7 @@ mod definition;
 mod error;
 mod fitting;
 pub(crate) mod image_settings;
+mod label_ramps;
 mod level;
 mod load;
 pub(crate) mod names;

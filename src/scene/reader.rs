@@ -169,7 +169,7 @@ impl<'a> Section<'a> {
 }
 
 /// The allowed labels, for errors.
-pub(super) const LABEL: &str = "an integer from 0 to 65535";
+pub(super) const LABEL: &str = "an integer >= 0, from 2⁶³ on in quotes";
 
 /// A value and its full key.
 pub(super) struct Entry<'a> {
@@ -263,9 +263,13 @@ impl<'a> Entry<'a> {
     }
 
     /// A label.
-    pub(super) fn label(&self) -> Result<u16, SceneError> {
-        let integer = self.value.as_integer().ok_or_else(|| self.mistyped(LABEL))?;
-        u16::try_from(integer).map_err(|_| self.refused(LABEL))
+    pub(super) fn label(&self) -> Result<u64, SceneError> {
+        match (self.value.as_integer(), self.value.as_str()) {
+            (Some(integer), _) => u64::try_from(integer).map_err(|_| self.refused(LABEL)),
+            // TOML's integers end at 2⁶³.
+            (_, Some(text)) => text.parse().map_err(|_| self.refused(LABEL)),
+            _ => Err(self.mistyped(LABEL)),
+        }
     }
 
     /// A number, written as a float or an integer. The settings' own check tests its range.

@@ -297,7 +297,7 @@ fn ramps(
 }
 
 /// Reads `[[transfer.label]]`.
-fn labels(entry: &Entry) -> Result<BTreeMap<u16, LabelTables>, SceneError> {
+fn labels(entry: &Entry) -> Result<BTreeMap<u64, LabelTables>, SceneError> {
     let mut labels = BTreeMap::new();
     for item in entry.items("tables [[transfer.label]]")? {
         let mut section = item.section("a table [[transfer.label]]")?;

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use super::label_ramps::{by_id, by_place};
 use crate::appearance::{Colormap, Preset};
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::Volume;
@@ -16,7 +17,8 @@ pub struct TransferSettings {
     pub preset: Option<Preset>,
     /// The colour map over the visible values, used if `color` is `None`.
     pub colormap: Option<Colormap>,
-    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the volume.
+    /// Red, green and blue in [0, 1] over voxel values; `None` is chosen from the volume. Where values are places of labels in the file ([`Volume::label_ids`]),
+    /// this, the opacity and the iso-ranges are over the file's numbers.
     pub color: Option<Ramp<DVec3>>,
     /// Opacity per unit length in [0, 1] over voxel values; `None` is chosen from the volume.
     pub opacity: Option<Ramp<f64>>,
@@ -24,22 +26,38 @@ pub struct TransferSettings {
     pub gradient_opacity: Option<Ramp<f64>>,
     /// Closed intervals `[lo, hi]` of the values that take part; `None` means all values.
     pub iso_ranges: Option<Vec<[f64; 2]>>,
-    /// Tables for single labels of a segmented volume; empty for other volumes.
-    pub labels: BTreeMap<u16, LabelTables>,
+    /// Tables for single labels of a segmented volume, by their numbers in the file ([`Volume::label_ids`]); empty for other volumes. Numbers that the file
+    /// lacks have no effect.
+    pub labels: BTreeMap<u64, LabelTables>,
 }
 
 impl From<TransferFunction> for TransferSettings {
-    /// Settings that state everything about one channel; further ones are ignored.
+    /// Settings that state everything about one channel, whose labels are their own numbers; further channels are ignored.
     fn from(transfer: TransferFunction) -> Self {
-        // Whether values are labels is the volume's own.
-        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, membership: _, further: _ } =
-            transfer;
-        let (color, opacity) = (Some(color), Some(opacity));
-        Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels }
+        Self::numbered(transfer, &u64::from)
     }
 }
 
 impl TransferSettings {
+    /// Settings that state everything about one channel, given the number of each label.
+    fn numbered(transfer: TransferFunction, number: &dyn Fn(u16) -> u64) -> Self {
+        // Whether values are labels is the volume's own.
+        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, membership: _, further: _ } =
+            transfer;
+        let (color, opacity) = (Some(color), Some(opacity));
+        let mut numbered = BTreeMap::new();
+        for (label, tables) in labels {
+            numbered.insert(number(label), tables);
+        }
+        Self { preset: None, colormap: None, color, opacity, gradient_opacity, iso_ranges, labels: numbered }
+    }
+
+    /// Settings that state everything about a volume's own channel, with labels by their numbers in its file.
+    #[doc(hidden)]
+    pub fn stating(transfer: TransferFunction, volume: &Volume) -> Self {
+        Self::numbered(by_id(transfer, volume), &|label| volume.label_id(label))
+    }
+
     /// Whether more is stated than a preset.
     pub(super) fn states_more(&self) -> bool {
         *self != Self { preset: self.preset, ..Self::default() }
@@ -73,7 +91,8 @@ impl TransferSettings {
         // Presets have no gradient opacity.
         transfer.gradient_opacity = self.gradient_opacity.clone();
         transfer.iso_ranges = self.iso_ranges.clone();
-        for (&label, own) in &self.labels {
+        for (&id, own) in &self.labels {
+            let Some(label) = volume.label_of_id(id) else { continue };
             let LabelTables { color, opacity, gradient_opacity, membership, .. } =
                 transfer.labels.remove(&label).unwrap_or_default();
             let tables = LabelTables {
@@ -85,10 +104,12 @@ impl TransferSettings {
             };
             transfer.labels.insert(label, tables);
         }
-        match (&self.color, self.colormap) {
-            (Some(color), _) => transfer.color = color.clone(),
-            (None, Some(map)) => transfer.color = map.of(volume, &transfer).unwrap_or(transfer.color),
-            (None, None) => {}
+        if let Some(color) = &self.color {
+            transfer.color = color.clone();
+        }
+        let mut transfer = by_place(transfer, volume, [self.color.is_some(), self.opacity.is_some()]);
+        if let (None, Some(map)) = (&self.color, self.colormap) {
+            transfer.color = map.of(volume, &transfer).unwrap_or(transfer.color);
         }
         transfer
     }

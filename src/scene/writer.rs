@@ -223,7 +223,10 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
     for (&label, tables) in labels {
         let parent = if text.channel.is_some() { "channel." } else { "" };
         let _ = writeln!(text.text, "\n[[{parent}transfer.label]]");
-        text.line("label", i64::from(label));
+        match i64::try_from(label) {
+            Ok(label) => text.line("label", label),
+            Err(_) => text.line("label", label.to_string()),
+        }
         text.line("visible", tables.visible);
         text.ramps(tables.color.as_ref(), tables.opacity.as_ref(), tables.gradient_opacity.as_ref());
         if tables.membership {

@@ -224,7 +224,7 @@ pub(crate) struct Parts<'a> {
     pub(crate) color: Option<&'a Ramp<DVec3>>,
     pub(crate) opacity: Option<&'a Ramp<f64>>,
     pub(crate) iso_ranges: Option<&'a [[f64; 2]]>,
-    pub(crate) labels: &'a BTreeMap<u16, LabelTables>,
+    pub(crate) labels: Vec<&'a LabelTables>,
 }
 
 /// Checks that the tables of all channels have a bounded number of pieces: those of a channel count again for each label that uses them.
@@ -238,7 +238,7 @@ pub(crate) fn check_pieces<'a>(table: &str, channels: impl Iterator<Item = Parts
             let opacities = own.opacity.as_ref().map_or(opacities, opacity_pieces);
             opacities + own.color.as_ref().map_or(colors, |ramp| ramp.points().len()) + ends
         };
-        let all = labels.values().map(of_label).chain([opacities + colors + ends]);
+        let all = labels.into_iter().map(of_label).chain([opacities + colors + ends]);
         all.fold(0_usize, usize::saturating_add)
     };
     let pieces = channels.map(of_channel).fold(0_usize, usize::saturating_add);
@@ -283,9 +283,15 @@ pub(crate) fn check_ramps(
     Ok(())
 }
 
-/// Checks the tables of labels.
-pub(crate) fn check_labels(table: &str, labels: &BTreeMap<u16, LabelTables>) -> Result<(), SettingError> {
-    labels.iter().try_for_each(|(label, tables)| tables.check(&format!("{table}.label[{label}]")))
+/// Checks the tables of labels, each behind its number.
+pub(crate) fn check_labels(
+    table: &str,
+    labels: &mut dyn Iterator<Item = (u64, &LabelTables)>,
+) -> Result<(), SettingError> {
+    for (label, tables) in labels {
+        tables.check(&format!("{table}.label[{label}]"))?;
+    }
+    Ok(())
 }
 
 /// Checks that the list of intervals, if stated, is not empty, and that intervals are finite and not reversed.
@@ -323,11 +329,12 @@ impl TransferFunction {
     pub(crate) fn check_as(&self, table: &str) -> Result<(), SettingError> {
         check_ramps(table, Some(&self.color), Some(&self.opacity), self.gradient_opacity.as_ref())?;
         check_iso_ranges(table, self.iso_ranges.as_deref())?;
-        check_labels(table, &self.labels)
+        check_labels(table, &mut self.labels.iter().map(|(&label, tables)| (label.into(), tables)))
     }
 
     fn parts(&self) -> Parts<'_> {
         let Self { color, opacity, iso_ranges, labels, .. } = self;
+        let labels = labels.values().collect();
         Parts { color: Some(color), opacity: Some(opacity), iso_ranges: iso_ranges.as_deref(), labels }
     }
 

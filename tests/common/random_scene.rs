@@ -356,7 +356,7 @@ fn opacities(random: &mut Random, range: [f64; 2], compositing: Compositing) -> 
     Ramp::new(positions.into_iter().map(opacity).collect()).unwrap()
 }
 
-fn label_tables(random: &mut Random, volume: &Volume, compositing: Compositing) -> BTreeMap<u16, LabelTables> {
+fn label_tables(random: &mut Random, volume: &Volume, compositing: Compositing) -> BTreeMap<u64, LabelTables> {
     let shown = transfer(random, volume, compositing);
     let shown = LabelTables { color: shown.color, opacity: shown.opacity, ..LabelTables::default() };
     BTreeMap::from([(1, shown), (2, LabelTables { visible: false, ..LabelTables::default() })])

@@ -80,7 +80,7 @@ fn labels_of_every_type() {
 #[test]
 fn an_invalid_label_is_named_with_its_voxel() {
     let folder = Folder::new();
-    let allowed = "labels, whole numbers from 0 to 65535";
+    let allowed = "labels, whole numbers from 0 on";
     let refused = |name: &str, good: &[u8], bad: &[u8], shown: &str| {
         // The eighth voxel is invalid.
         let data = [good.repeat(7), bad.to_vec(), good.repeat(4)].concat();
@@ -89,9 +89,7 @@ fn an_invalid_label_is_named_with_its_voxel() {
     };
     refused("int8", &[1], &[0xff], "-1");
     refused("short", &[1, 0], &(-32768_i16).to_le_bytes(), "-32768");
-    refused("int", &1_i32.to_le_bytes(), &65536_i32.to_le_bytes(), "65536");
-    refused("int", &1_i32.to_le_bytes(), &16_777_217_i32.to_le_bytes(), "16777217");
-    refused("uint64", &1_u64.to_le_bytes(), &(1_u64 << 40).to_le_bytes(), "1099511627776");
+    refused("int", &1_i32.to_le_bytes(), &(-65536_i32).to_le_bytes(), "-65536");
     refused("float", &1_f32.to_le_bytes(), &2.5_f32.to_le_bytes(), "2.5");
     refused("float", &1_f32.to_le_bytes(), &f32::NAN.to_le_bytes(), "NaN");
     // The number is not whole, although its nearest f32 is.
@@ -193,7 +191,7 @@ fn rgb(color: [f64; 3]) -> Option<Ramp<DVec3>> {
 }
 
 /// Tables that differ from the main one in every possible way.
-fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
+fn tables(labels: &[u16]) -> impl Iterator<Item = (u64, LabelTables)> {
     let none = LabelTables::default;
     let gradients = [(10.0, 0.0), (20.0, 0.3), (60.0, 1.0)];
     let many: Vec<(f64, f64)> = (0..45).map(|at| (f64::from(at) * 5.5, f64::from(at % 4) / 8.0)).collect();
@@ -206,7 +204,7 @@ fn tables(labels: &[u16]) -> impl Iterator<Item = (u16, LabelTables)> {
         LabelTables { opacity: ramp(&many), gradient_opacity: ramp(&[(0.0, 1.0)]), ..none() },
         LabelTables { visible: false, ..none() },
     ];
-    labels.iter().copied().zip(all)
+    labels.iter().map(|&label| u64::from(label)).zip(all)
 }
 
 /// Draws a scene by everything that draws it, with and without culling, and compares with the f64 evaluation.

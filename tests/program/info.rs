@@ -233,3 +233,20 @@ fn labels_are_known_by_the_header_or_by_their_looks() {
     let (preset, reason) = of("regions.nrrd");
     assert!(preset == "labels" && reason.unwrap().starts_with("the values look like labels: whole numbers"));
 }
+
+#[test]
+fn labels_beyond_16_bits_are_told_by_their_numbers() {
+    let folder = Folder::new();
+    let header =
+        "NRRD0004\ntype: uint64\ndimension: 3\nsizes: 8 2 2\nspacings: 1 1 1\nendian: little\nencoding: raw\n\n";
+    let ids = [0, 70_000, 312_782_547, u64::MAX];
+    let labels = (0..32).flat_map(|at: usize| ids[at % 8 / 2].to_le_bytes());
+    folder.write("labels.nrrd", header.bytes().chain(labels).collect::<Vec<u8>>());
+    let json: Value = serde_json::from_str(&info(&folder, "labels.nrrd --json")).unwrap();
+    assert_eq!((&json["ids"], &json["max"]), (&serde_json::json!(ids), &serde_json::json!(3.0)));
+    let text = info(&folder, "labels.nrrd");
+    let told = "ids          0 to 18446744073709551615; values and labels below are their places, 0 to 3";
+    assert!(text.contains(told), "{text}");
+    let plain: Value = serde_json::from_str(&info(&folder, &format!("{} --json", fixture("nifti2.nii")))).unwrap();
+    assert_eq!(plain["ids"], Value::Null);
+}

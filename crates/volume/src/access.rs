@@ -22,6 +22,7 @@ use super::outputs::Outputs;
 use super::rounding::Rounding;
 use super::sample_type::SampleType;
 use super::series::Selection;
+use super::voxels::Wanted;
 
 /// Options for reading volumes, labels and scenes. By default files may lie anywhere.
 ///
@@ -147,7 +148,7 @@ impl ReadOptions {
 
 /// [`ReadOptions`] while a volume and its labels are read. Clones share the memory limit.
 #[derive(Clone)]
-pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>, Option<Arc<str>>, Option<DVec3>);
+pub struct Access(Arc<Inner>, Selection, Option<Arc<Notes>>, Option<Arc<str>>, Option<DVec3>, Wanted);
 
 struct Inner {
     given: Option<Files>,
@@ -190,13 +191,14 @@ impl Access {
             None,
             options.series.as_deref().map(Arc::from),
             None,
+            Wanted::Values,
         ))
     }
 
     /// The same access for readers that only note where samples are, and read none.
     pub(super) fn noting(&self) -> (Self, Arc<Notes>) {
         let notes = Arc::new(Notes::default());
-        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes)), self.3.clone(), self.4), notes)
+        (Self(Arc::clone(&self.0), self.1, Some(Arc::clone(&notes)), self.3.clone(), self.4, self.5), notes)
     }
 
     /// Whether readers note where samples are, and read none.
@@ -240,7 +242,8 @@ impl Access {
     /// The same access to files of one volume, at a level.
     #[doc(hidden)]
     pub fn whole_at(&self, level: u32) -> Self {
-        Self(Arc::clone(&self.0), Selection { level: Some(level), ..Selection::default() }, None, None, None)
+        let selection = Selection { level: Some(level), ..Selection::default() };
+        Self(Arc::clone(&self.0), selection, None, None, None, self.5)
     }
 
     /// The same access to other volumes of a file. What the options select goes before it.
@@ -248,20 +251,30 @@ impl Access {
     pub fn selecting(&self, other: Selection) -> Self {
         let Selection { channel, time, level } = self.1;
         let (channel, time, level) = (channel.or(other.channel), time.or(other.time), level.or(other.level));
-        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone(), self.3.clone(), self.4)
+        Self(Arc::clone(&self.0), Selection { channel, time, level }, self.2.clone(), self.3.clone(), self.4, self.5)
     }
 
     /// The same access to a series of a folder. The one that the options choose goes before it.
     #[doc(hidden)]
     pub fn of_series(&self, series: Option<&str>) -> Self {
         let series = self.3.clone().or_else(|| series.map(Arc::from));
-        Self(Arc::clone(&self.0), self.1, self.2.clone(), series, self.4)
+        Self(Arc::clone(&self.0), self.1, self.2.clone(), series, self.4, self.5)
     }
 
     /// The same access to a file in place of whose spacing the scene states another.
     #[doc(hidden)]
     pub fn of_spacing(&self, spacing: Option<DVec3>) -> Self {
-        Self(Arc::clone(&self.0), self.1, self.2.clone(), self.3.clone(), spacing)
+        Self(Arc::clone(&self.0), self.1, self.2.clone(), self.3.clone(), spacing, self.5)
+    }
+
+    /// The same access to files whose samples become values, or ids of labels.
+    pub(super) fn wanting(&self, wanted: Wanted) -> Self {
+        Self(Arc::clone(&self.0), self.1, self.2.clone(), self.3.clone(), self.4, wanted)
+    }
+
+    /// The numbers that samples become.
+    pub(super) fn wanted(&self) -> Wanted {
+        self.5
     }
 
     /// The spacing that the scene states in place of the file's.

@@ -9,7 +9,7 @@ use super::access::Access;
 use super::error::volume::invalid;
 use super::samples::Samples;
 use super::source::Source;
-use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 
 /// The maximum width of a number in a file's name.
 const MAX_WIDTH: usize = 20;
@@ -57,20 +57,20 @@ impl DataFiles {
     }
 
     /// The samples of all files, each read by `read`. `field` is the header's field that names the files.
-    pub(super) fn read<T: Voxel>(
+    pub(super) fn read(
         &self,
         header: &Path,
         field: &str,
         samples: &Samples,
         access: &Access,
-        read: impl Fn(Source, &Samples) -> Result<T::Many, VolumeError>,
-    ) -> Result<T::Many, VolumeError> {
+        read: impl Fn(Source, &Samples) -> Result<Voxels, VolumeError>,
+    ) -> Result<Voxels, VolumeError> {
         let count = self.count();
         let part = self
             .part(samples.dims, count)
             .map_err(|allowed| invalid(header, field, format!("{count} files"), allowed))?;
         let part = Samples { dims: part, ..*samples };
-        let mut values = T::Many::default();
+        let mut values = access.wanted().none();
         for at in 0..count {
             let name = match &self.names {
                 Names::Listed(names) => names[at as usize].clone(),

@@ -12,25 +12,24 @@ use super::head::{head, is_bare_dicom};
 use super::loaded::Loaded;
 use super::seek::FileStore;
 use super::store::Store;
-use super::voxel::Voxel;
 use super::{Grid, VolumeError, folder, nrrd, turned};
 
-type Reader<T> = fn(&Path, &Access) -> Result<Loaded<T>, VolumeError>;
+type Reader = fn(&Path, &Access) -> Result<Loaded, VolumeError>;
 
 /// Reads a volume from a folder, given those of its files that are of the format.
-type FolderReader<T> = fn(&Path, &[PathBuf], &Access) -> Result<Loaded<T>, VolumeError>;
+type FolderReader = fn(&Path, &[PathBuf], &Access) -> Result<Loaded, VolumeError>;
 
 /// A format and its reader.
-struct Format<T: Voxel> {
+struct Format {
     name: &'static str,
     /// The extensions of its files.
     extensions: &'static [&'static str],
     /// Whether a file that begins with these bytes is certainly of this format.
     is_magic: fn(&[u8]) -> bool,
     /// The reader, or the feature that would compile it.
-    read: Result<Reader<T>, &'static str>,
+    read: Result<Reader, &'static str>,
     /// The reader of a folder of slices, if the format has them.
-    read_folder: Option<FolderReader<T>>,
+    read_folder: Option<FolderReader>,
 }
 
 /// A module's reader, or the feature that would compile it.
@@ -40,6 +39,17 @@ macro_rules! reader {
         let read: Result<_, &'static str> = Ok($read as _);
         #[cfg(not(feature = $feature))]
         let read = Err($feature);
+        read
+    }};
+}
+
+/// A module's reader of folders, if it is compiled.
+macro_rules! folder_reader {
+    ($feature:literal, $read:path) => {{
+        #[cfg(feature = $feature)]
+        let read: Option<FolderReader> = Some($read as _);
+        #[cfg(not(feature = $feature))]
+        let read = None;
         read
     }};
 }
@@ -57,109 +67,106 @@ const NO_SERIES: &str = "no series, which only DICOM has";
 /// Formats with one slice per file of a folder.
 const SLICES: [&str; 2] = ["TIFF", DICOM];
 
-fn formats<T: Voxel>() -> Vec<Format<T>> {
-    vec![
-        // The preamble before `DICM` may be the beginning of any other file, often of a TIFF (PS3.10 7.1), so that this format comes first. The group of
-        // the element after it tells it from another format's text.
-        Format {
-            name: DICOM,
-            extensions: &[".dcm"],
-            is_magic: |head| head.get(128..134) == Some(b"DICM\x02\0"),
-            read: reader!("dicom", super::dicom::read),
-            read_folder: reader!("dicom", super::dicom::read_folder).ok(),
+static FORMATS: [Format; 11] = [
+    // The preamble before `DICM` may be the beginning of any other file, often of a TIFF (PS3.10 7.1), so that this format comes first. The group of
+    // the element after it tells it from another format's text.
+    Format {
+        name: DICOM,
+        extensions: &[".dcm"],
+        is_magic: |head| head.get(128..134) == Some(b"DICM\x02\0"),
+        read: reader!("dicom", super::dicom::read),
+        read_folder: folder_reader!("dicom", super::dicom::read_folder),
+    },
+    Format {
+        name: "NRRD",
+        extensions: &[".nrrd", ".nhdr"],
+        is_magic: |head| head.starts_with(b"NRRD000"),
+        read: Ok(nrrd::read),
+        read_folder: None,
+    },
+    Format {
+        name: "NIfTI",
+        extensions: &[".nii", ".nii.gz", ".hdr", ".img", ".hdr.gz", ".img.gz"],
+        // Other files may hold the magic, which is not at their beginning, among their data.
+        is_magic: |head| {
+            let [size, swapped] =
+                head.first_chunk().map_or([0; 2], |&size| [u32::from_le_bytes(size), u32::from_be_bytes(size)]);
+            let is_sized = |bytes: u32| size == bytes || swapped == bytes;
+            is_sized(348) && matches!(head.get(344..348), Some(b"n+1\0" | b"ni1\0"))
+                || is_sized(540) && matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
         },
-        Format {
-            name: "NRRD",
-            extensions: &[".nrrd", ".nhdr"],
-            is_magic: |head| head.starts_with(b"NRRD000"),
-            read: Ok(nrrd::read),
-            read_folder: None,
+        read: reader!("nifti", super::nifti::read),
+        read_folder: None,
+    },
+    Format {
+        name: "MGH",
+        extensions: &[".mgh", ".mgz", ".mgh.gz"],
+        // The file begins with its version, 1, and may be gzipped.
+        is_magic: |_| false,
+        read: reader!("mgh", super::mgh::read),
+        read_folder: None,
+    },
+    Format {
+        name: "MetaImage",
+        extensions: &[".mha", ".mhd"],
+        is_magic: |head| head.starts_with(b"ObjectType = Image"),
+        read: reader!("metaimage", super::metaimage::read),
+        read_folder: None,
+    },
+    Format {
+        name: "NPY",
+        extensions: &[".npy"],
+        is_magic: |head| head.starts_with(b"\x93NUMPY"),
+        read: reader!("npy", super::npy::read),
+        read_folder: None,
+    },
+    Format {
+        name: ZARR,
+        extensions: &[".zip", ".ozx"],
+        // A store is a folder, or an archive that begins like other ZIP archives.
+        is_magic: |_| false,
+        read: reader!("zarr", super::zarr::read),
+        read_folder: None,
+    },
+    Format {
+        name: NPZ,
+        extensions: &[".npz"],
+        is_magic: |head| head.starts_with(b"PK\x03\x04"),
+        read: reader!("npy", super::npz::read),
+        read_folder: None,
+    },
+    Format {
+        name: "TIFF",
+        extensions: &[".tif", ".tiff"],
+        is_magic: |head| matches!(head.get(..4), Some(b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+")),
+        read: reader!("tiff", super::tiff::read),
+        read_folder: folder_reader!("tiff", super::tiff::read_folder),
+    },
+    Format {
+        name: "VTI",
+        extensions: &[".vti", ".vtr"],
+        // Other texts may hold the element's name, too.
+        is_magic: |head| {
+            let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+            text.starts_with(b"<") && text.windows(8).any(|window| window == b"<VTKFile")
         },
-        Format {
-            name: "NIfTI",
-            extensions: &[".nii", ".nii.gz", ".hdr", ".img", ".hdr.gz", ".img.gz"],
-            // Other files may hold the magic, which is not at their beginning, among their data.
-            is_magic: |head| {
-                let [size, swapped] =
-                    head.first_chunk().map_or([0; 2], |&size| [u32::from_le_bytes(size), u32::from_be_bytes(size)]);
-                let is_sized = |bytes: u32| size == bytes || swapped == bytes;
-                is_sized(348) && matches!(head.get(344..348), Some(b"n+1\0" | b"ni1\0"))
-                    || is_sized(540) && matches!(head.get(4..8), Some(b"n+2\0" | b"ni2\0"))
-            },
-            read: reader!("nifti", super::nifti::read),
-            read_folder: None,
-        },
-        Format {
-            name: "MGH",
-            extensions: &[".mgh", ".mgz", ".mgh.gz"],
-            // The file begins with its version, 1, and may be gzipped.
-            is_magic: |_| false,
-            read: reader!("mgh", super::mgh::read),
-            read_folder: None,
-        },
-        Format {
-            name: "MetaImage",
-            extensions: &[".mha", ".mhd"],
-            is_magic: |head| head.starts_with(b"ObjectType = Image"),
-            read: reader!("metaimage", super::metaimage::read),
-            read_folder: None,
-        },
-        Format {
-            name: "NPY",
-            extensions: &[".npy"],
-            is_magic: |head| head.starts_with(b"\x93NUMPY"),
-            read: reader!("npy", super::npy::read),
-            read_folder: None,
-        },
-        Format {
-            name: ZARR,
-            extensions: &[".zip", ".ozx"],
-            // A store is a folder, or an archive that begins like other ZIP archives.
-            is_magic: |_| false,
-            read: reader!("zarr", super::zarr::read),
-            read_folder: None,
-        },
-        Format {
-            name: NPZ,
-            extensions: &[".npz"],
-            is_magic: |head| head.starts_with(b"PK\x03\x04"),
-            read: reader!("npy", super::npz::read),
-            read_folder: None,
-        },
-        Format {
-            name: "TIFF",
-            extensions: &[".tif", ".tiff"],
-            is_magic: |head| matches!(head.get(..4), Some(b"II*\0" | b"MM\0*" | b"II+\0" | b"MM\0+")),
-            read: reader!("tiff", super::tiff::read),
-            read_folder: reader!("tiff", super::tiff::read_folder).ok(),
-        },
-        Format {
-            name: "VTI",
-            extensions: &[".vti", ".vtr"],
-            // Other texts may hold the element's name, too.
-            is_magic: |head| {
-                let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
-                text.starts_with(b"<") && text.windows(8).any(|window| window == b"<VTKFile")
-            },
-            read: reader!("vtk", super::vtk::read_image_data),
-            read_folder: None,
-        },
-        Format {
-            name: "VTK",
-            extensions: &[".vtk"],
-            is_magic: |head| head.starts_with(b"# vtk DataFile"),
-            read: reader!("vtk", super::vtk::read_legacy),
-            read_folder: None,
-        },
-    ]
-}
+        read: reader!("vtk", super::vtk::read_image_data),
+        read_folder: None,
+    },
+    Format {
+        name: "VTK",
+        extensions: &[".vtk"],
+        is_magic: |head| head.starts_with(b"# vtk DataFile"),
+        read: reader!("vtk", super::vtk::read_legacy),
+        read_folder: None,
+    },
+];
 
 /// Reads a file and returns the name of its format, determined by its first bytes or else by its name; or reads a folder of slices,
 /// whose format the first bytes of all its files determine.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static str, Loaded<T>), VolumeError> {
-    let formats = formats();
+pub(super) fn read(path: &Path, access: &Access) -> Result<(&'static str, Loaded), VolumeError> {
     let (file, _) = archive_and_inner(path);
-    let format = format_at(&formats, path, access)?;
+    let format = format_at(path, access)?;
     if let Some(level) = access.selection().level.filter(|&level| level > 0 && format.is_none_or(|of| of.name != ZARR))
     {
         return Err(invalid(path, "level", level, "0, the only one"));
@@ -168,7 +175,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
         return Err(invalid(path, "series", series, NO_SERIES));
     }
     let found = match format {
-        None if access.is_folder(file)? => return read_folder(path, access, &formats),
+        None if access.is_folder(file)? => return read_folder(path, access),
         Some(Format { name, read: Ok(read), .. }) => return Ok((name, guarded(path, || read(path, access))?)),
         Some(Format { name, read: Err(feature), .. }) => needs(name, feature),
         None => match path.extension() {
@@ -177,12 +184,12 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
         },
     };
     let list = |compiled: bool| {
-        let formats = formats.iter().filter(|format| format.read.is_ok() == compiled);
+        let formats = FORMATS.iter().filter(|format| format.read.is_ok() == compiled);
         let names = formats.map(|Format { name, extensions, .. }| format!("{name} ({})", extensions.join(", ")));
         names.collect::<Vec<_>>().join(", ")
     };
     let mut allowed = format!("{}, or raw samples by `volume.dims` and `volume.type`", list(true));
-    if formats.iter().any(|format| format.read.is_err()) {
+    if FORMATS.iter().any(|format| format.read.is_err()) {
         allowed = format!("{allowed}; not compiled in: {}", list(false));
     }
     Err(invalid(path, "format", found, allowed))
@@ -190,8 +197,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<(&'static s
 
 /// Opens the selected channels of a file that is read by boxes.
 pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
-    let formats = formats::<f32>();
-    let format = format_at(&formats, path, access)?;
+    let format = format_at(path, access)?;
     if let Some(series) = access.series().filter(|_| format.is_some_and(|of| of.name != DICOM)) {
         return Err(invalid(path, "series", series, NO_SERIES));
     }
@@ -219,7 +225,7 @@ pub(super) fn open_stores(path: &Path, access: &Access) -> Result<Vec<Arc<dyn St
 
 /// The grids of a store's levels, from the finest; empty for files of other formats.
 pub fn levels(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeError> {
-    match format_at(&formats::<f32>(), path, access)? {
+    match format_at(path, access)? {
         #[cfg(feature = "zarr")]
         Some(Format { name: ZARR, .. }) => super::zarr::grids(path, access),
         _ => Ok(Vec::new()),
@@ -227,21 +233,17 @@ pub fn levels(path: &Path, access: &Access) -> Result<Vec<Grid>, VolumeError> {
 }
 
 /// The format of a file or of a Zarr store; `None` if it is unknown, or for another folder.
-fn format_at<'a, T: Voxel>(
-    formats: &'a [Format<T>],
-    path: &Path,
-    access: &Access,
-) -> Result<Option<&'a Format<T>>, VolumeError> {
+fn format_at(path: &Path, access: &Access) -> Result<Option<&'static Format>, VolumeError> {
     if access.is_address(path)? {
-        return Ok(formats.iter().find(|format| format.name == ZARR));
+        return Ok(FORMATS.iter().find(|format| format.name == ZARR));
     }
     let (file, _) = archive_and_inner(path);
     if access.is_folder(file)? {
         let is_store = is_zarr(file, access)?;
-        return Ok(formats.iter().find(|format| format.name == ZARR && is_store));
+        return Ok(FORMATS.iter().find(|format| format.name == ZARR && is_store));
     }
     let head = head(file, access)?;
-    Ok(format_of(formats, file, &head).map(|(format, _)| format))
+    Ok(format_of(file, &head).map(|(format, _)| format))
 }
 
 /// Whether a folder holds the metadata of a Zarr store.
@@ -257,32 +259,27 @@ fn is_zarr(folder: &Path, access: &Access) -> Result<bool, VolumeError> {
 }
 
 /// A file's format, and whether its first bytes determined it.
-fn format_of<'a, T: Voxel>(formats: &'a [Format<T>], path: &Path, head: &[u8]) -> Option<(&'a Format<T>, bool)> {
+fn format_of(path: &Path, head: &[u8]) -> Option<(&'static Format, bool)> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
-    let is_named = |format: &Format<T>| format.extensions.iter().any(|extension| name.ends_with(extension));
-    let named = formats.iter().find(|format| is_named(format));
+    let is_named = |format: &Format| format.extensions.iter().any(|extension| name.ends_with(extension));
+    let named = FORMATS.iter().find(|format| is_named(format));
     // Ambiguous first bytes count only if the name does not contradict them.
-    let is_bare = |format: &Format<T>| {
-        format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM)
-    };
-    let is_other_archive = |format: &Format<T>| format.name == NPZ && named.is_some_and(|named| named.name == ZARR);
-    let by_head = |format: &&Format<T>| (format.is_magic)(head) && !is_other_archive(format) || is_bare(format);
-    formats.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
+    let is_bare =
+        |format: &Format| format.name == DICOM && is_bare_dicom(head) && named.is_none_or(|named| named.name == DICOM);
+    let is_other_archive = |format: &Format| format.name == NPZ && named.is_some_and(|named| named.name == ZARR);
+    let by_head = |format: &&Format| (format.is_magic)(head) && !is_other_archive(format) || is_bare(format);
+    FORMATS.iter().find(by_head).map(|format| (format, true)).or(named.map(|format| (format, false)))
 }
 
-fn read_folder<T: Voxel>(
-    path: &Path,
-    access: &Access,
-    formats: &[Format<T>],
-) -> Result<(&'static str, Loaded<T>), VolumeError> {
-    let mut slices: Vec<(&Format<T>, Vec<PathBuf>)> = Vec::new();
+fn read_folder(path: &Path, access: &Access) -> Result<(&'static str, Loaded), VolumeError> {
+    let mut slices: Vec<(&Format, Vec<PathBuf>)> = Vec::new();
     let files = folder::files(path, access)?;
     let count = files.len();
-    let is_of_slices = |format: &Format<T>| SLICES.contains(&format.name);
+    let is_of_slices = |format: &Format| SLICES.contains(&format.name);
     let mut left_out = Vec::new();
     for file in files {
         let head = head(&file, access)?;
-        let format = match format_of(formats, &file, &head) {
+        let format = match format_of(&file, &head) {
             Some((format, true)) if is_of_slices(format) => format,
             other => {
                 let name = file.file_name().unwrap_or_default().to_string_lossy();

@@ -7,13 +7,15 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3};
 
 use super::access::{Access, ReadOptions};
-use super::error::volume::refused;
+use super::error::volume::{invalid, refused};
 use super::format;
 use super::label_facts::LabelFacts;
+use super::label_ids::{Numbered, label_of};
 use super::loaded::Loaded;
 use super::membership::{KeptMembership, Members};
 use super::resample::labels_onto;
-use super::voxel::Voxel;
+use super::sample_type::Sample;
+use super::voxels::Wanted;
 use super::{Grid, Orientation, Volume, VolumeError};
 
 /// Spacings whose relative difference is less than this count as equal.
@@ -35,11 +37,12 @@ pub struct Labels {
 }
 
 impl Labels {
-    /// Reads a label file: a volume file of any format that [`Volume::open`] reads, with whole numbers from 0 to 65535 in any sample type.
+    /// Reads a label file: a volume file of any format that [`Volume::open`] reads, with whole numbers from 0 to 65535 in any sample type. Larger ones are
+    /// read as the labels of a scene's volume, which keeps what they stand for ([`Volume::label_ids`]).
     ///
     /// # Errors
     /// If the file cannot be read, is of no known format, does not hold what its header promises, or has a sample that is not a
-    /// label (the error names the voxel).
+    /// label (the error names the voxel, or the largest label).
     pub fn open(path: &Path) -> Result<Self, VolumeError> {
         Self::open_with(path, &ReadOptions::default())
     }
@@ -54,17 +57,38 @@ impl Labels {
 
     #[doc(hidden)]
     pub fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        Self::oriented(path, access).map(|(labels, _)| labels)
+        let Stated { labels, ids, .. } = Stated::read(path, access)?;
+        match ids.and_then(|ids| ids.last().copied()) {
+            Some(largest) => Err(invalid(path, "data", format!("labels up to {largest}"), ALLOWED)),
+            None => Ok(labels),
+        }
     }
+}
 
-    /// The labels of a file, and how they lie in the patient, if it states that.
-    fn oriented(path: &Path, access: &Access) -> Result<(Self, Option<Orientation>), VolumeError> {
-        let (_, loaded) = format::read::<u16>(path, access)?;
+/// The labels that 16 bits hold.
+const ALLOWED: &str = "labels, whole numbers from 0 to 65535";
+
+/// The labels of a file, and what it states about them.
+struct Stated {
+    labels: Labels,
+    /// The numbers of the labels in the file, if these are others.
+    ids: Option<Arc<[u64]>>,
+    colors: Vec<(f64, DVec3)>,
+    /// How they lie in the patient.
+    orientation: Option<Orientation>,
+}
+
+impl Stated {
+    fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        let (_, loaded) = format::read(path, &access.wanting(Wanted::Ids))?;
         loaded.check_single(path, "one: a label for every voxel")?;
-        let names = loaded.legend(access.selection().channel.unwrap_or(0) as usize, 0).names;
+        let legend = loaded.legend(access.selection().channel.unwrap_or(0) as usize, 0);
         let Loaded { dims, spacing, values, orientation, .. } = loaded;
+        let Numbered { labels: values, ids } = values.into_ids().numbered(path)?;
+        let (names, colors) = (legend.label_names(ids.as_deref()), legend.label_colors(ids.as_deref()));
         let origin = path.display().to_string();
-        Ok((Self { origin, dims, spacing, values: values.into(), names }, orientation))
+        let labels = Labels { origin, dims, spacing, values: values.into(), names };
+        Ok(Self { labels, ids, colors, orientation })
     }
 }
 
@@ -78,9 +102,9 @@ pub fn labels_of(
     values: impl IntoIterator<Item = f32>,
 ) -> Result<Arc<[u16]>, VolumeError> {
     let label = |(index, value): (u32, f32)| {
-        u16::of(value).ok_or_else(|| {
+        label_of(value.to_id().unwrap_or(u64::MAX), None).ok_or_else(|| {
             let voxel = grid.file_voxel(from + step * Grid::new(dims, DVec3::ONE).voxel_at(index));
-            VolumeError::invalid(origin, "data", format!("{value} at voxel {voxel}"), u16::ALLOWED.to_owned())
+            VolumeError::invalid(origin, "data", format!("{value} at voxel {voxel}"), ALLOWED.to_owned())
         })
     };
     (0..).zip(values).map(label).collect()
@@ -102,7 +126,19 @@ impl Volume {
     /// The errors of [`Labels::open_with`] and [`Self::with_labels`], and one if the labels lie nowhere in the volume.
     #[doc(hidden)]
     pub fn with_labels_of(self, path: &Path, has_spacing: bool, access: &Access) -> Result<Self, VolumeError> {
-        let (labels, orientation) = Labels::oriented(path, access)?;
+        let Stated { labels, ids, colors, orientation } = Stated::read(path, access)?;
+        let volume = self.with_placed_labels((labels, orientation), path, has_spacing, access)?;
+        Ok(Self { label_ids: ids, label_colors: colors, ..volume })
+    }
+
+    /// The same volume with labels, and how these lie in the patient.
+    fn with_placed_labels(
+        self,
+        (labels, orientation): (Labels, Option<Orientation>),
+        path: &Path,
+        has_spacing: bool,
+        access: &Access,
+    ) -> Result<Self, VolumeError> {
         if let (Some(own), Some(of_volume)) = (&orientation, self.orientation()) {
             let grid = Grid::new(labels.dims, labels.spacing.unwrap_or(DVec3::ONE));
             grid.check().map_err(|error| refused(&labels.origin, error))?;
@@ -169,6 +205,8 @@ impl Volume {
         self.labels = Some(values);
         self.membership[Members::OfLabels as usize] = KeptMembership::default();
         self.label_names = names;
+        self.label_ids = None;
+        self.label_colors = Vec::new();
         Ok(self)
     }
 
@@ -180,6 +218,27 @@ impl Volume {
     /// The names of labels, where known: of a segmented volume, or of one whose values are labels.
     pub fn label_names(&self) -> &BTreeMap<u16, String> {
         &self.label_names
+    }
+
+    /// The numbers of labels in the file, by label from 0 on, ascending: of a segmented volume, or of one whose values are labels. `None` if these are the
+    /// labels themselves. A file with numbers beyond 65535 is read as labels that take their places: label 0 is 0, and the others follow in order.
+    pub fn label_ids(&self) -> Option<&[u64]> {
+        self.label_ids.as_deref()
+    }
+
+    /// The number of a label in the file.
+    pub fn label_id(&self, label: u16) -> u64 {
+        self.label_ids().and_then(|ids| ids.get(usize::from(label))).map_or(u64::from(label), |&id| id)
+    }
+
+    /// The label that stands for a number in the file; `None` if none does.
+    pub fn label_of_id(&self, id: u64) -> Option<u16> {
+        label_of(id, self.label_ids())
+    }
+
+    /// The colours (red, green and blue in [0, 1]) that the file of a segmented volume's labels states for them, in ascending order of labels.
+    pub fn label_colors(&self) -> &[(f64, DVec3)] {
+        &self.label_colors
     }
 
     /// The same volume with values that are known to be labels.

@@ -15,6 +15,7 @@ mod access;
 mod adapted;
 mod address;
 mod assumed;
+mod borders;
 pub mod builtin;
 mod channels;
 mod coefficients;
@@ -39,6 +40,7 @@ mod index;
 mod inputs;
 mod label_facts;
 mod label_gradients;
+mod label_ids;
 mod labels;
 mod loaded;
 mod located;
@@ -55,6 +57,7 @@ pub mod npy;
 #[cfg(feature = "npy")]
 pub mod npz;
 mod nrrd;
+mod numbered;
 mod numbers;
 mod open;
 mod orientation;
@@ -87,6 +90,7 @@ mod value_slice;
 mod values;
 mod volume;
 mod voxel;
+mod voxels;
 #[cfg(feature = "vtk")]
 mod vtk;
 #[cfg(any(feature = "tiff", feature = "vtk"))]
@@ -130,6 +134,7 @@ pub mod internals {
     pub use crate::access::Access;
     pub use crate::adapted::AdaptedStore;
     pub use crate::address::{is_address, written_in};
+    pub use crate::borders::are_sharp;
     pub use crate::error::setting;
     pub use crate::format::levels;
     pub use crate::grid::{SIZES, dims_of};

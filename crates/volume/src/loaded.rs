@@ -7,9 +7,10 @@ use glam::{DVec3, UVec3};
 
 use super::display::ChannelDisplay;
 use super::error::volume::invalid;
-use super::sample_type::SampleType;
+use super::label_ids::label_of;
+use super::sample_type::{Sample, SampleType};
 use super::series::Series;
-use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 use super::{Encoding, Grid, Orientation, StoreFacts, VolumeError};
 use crate::StoreCounts;
 
@@ -18,7 +19,7 @@ use crate::StoreCounts;
 pub(super) const ASSUMED_AXES: &str = "the array's last ones are z, y and x";
 
 /// The contents of a file of values or labels.
-pub(super) struct Loaded<T: Voxel> {
+pub(super) struct Loaded {
     pub dims: UVec3,
     /// The type of the samples in the file.
     pub kind: SampleType,
@@ -49,14 +50,14 @@ pub(super) struct Loaded<T: Voxel> {
     /// The order of axes that was assumed, if the file states none.
     pub(super) assumed_axes: Option<&'static str>,
     /// One value per voxel, x fastest, channel by channel.
-    pub values: T::Many,
+    pub values: Voxels,
 }
 
 /// The names and colours that a file gives to single values.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Legend {
-    /// The values' names, if they are labels.
-    pub(super) names: BTreeMap<u16, String>,
+    /// The names of labels, each behind its id.
+    pub(super) names: Vec<(u64, String)>,
     /// Their colours, in ascending order of values.
     pub(super) palette: Option<Vec<(f64, DVec3)>>,
     /// Whether the file says that all values are labels, with or without names.
@@ -64,6 +65,36 @@ pub(super) struct Legend {
 }
 
 impl Legend {
+    /// The names of labels, given what these are, in ascending order, if ids are others.
+    pub(super) fn label_names(&self, ids: Option<&[u64]>) -> BTreeMap<u16, String> {
+        let mut names = BTreeMap::new();
+        // The first one of two names stays, as with colours.
+        for (id, name) in self.names.iter().rev() {
+            if let Some(label) = label_of(*id, ids) {
+                names.insert(label, name.clone());
+            }
+        }
+        names
+    }
+
+    /// Whether values are labels.
+    pub(super) fn is_of_labels(&self) -> bool {
+        self.are_labels || !self.names.is_empty()
+    }
+
+    /// The colours of labels, in ascending order.
+    pub(super) fn label_colors(&self, ids: Option<&[u64]>) -> Vec<(f64, DVec3)> {
+        let palette = self.palette.iter().flatten();
+        palette.filter_map(|&(id, color)| Some((label_of(id.to_id()?, ids)?.into(), color))).collect()
+    }
+
+    /// Colours in ascending order of values, the first one of each; `None` without any.
+    pub(super) fn ascending(mut colors: Vec<(f64, DVec3)>) -> Option<Vec<(f64, DVec3)>> {
+        colors.sort_by(|a, b| a.0.total_cmp(&b.0));
+        colors.dedup_by_key(|color| color.0);
+        Some(colors).filter(|colors| !colors.is_empty())
+    }
+
     /// Colours of values without names.
     #[cfg(any(feature = "dicom", feature = "tiff"))]
     pub(super) fn of_palette(palette: Option<Vec<(f64, DVec3)>>) -> Self {
@@ -83,9 +114,9 @@ pub(super) struct Levels {
     pub(super) reads: StoreCounts,
 }
 
-impl<T: Voxel> Loaded<T> {
+impl Loaded {
     /// Values about which the file states nothing else.
-    pub(super) fn new(dims: UVec3, kind: SampleType, values: T::Many) -> Self {
+    pub(super) fn new(dims: UVec3, kind: SampleType, values: Voxels) -> Self {
         let (legends, series, channel_names) = (Vec::new(), Series::default(), Vec::new());
         let (spacing, unit, orientation) = (None, None, None);
         let (time_names, series_names) = (Vec::new(), Vec::new());
@@ -113,7 +144,9 @@ impl<T: Voxel> Loaded<T> {
     /// The facts that the file, of some format, states about one of its channels, `number` among those that are read. The first channel has the facts that concern all.
     pub(super) fn facts(&self, format: &'static str, channel: usize, number: usize) -> StoreFacts {
         let Self { series, spacing, unit, .. } = self;
-        let Legend { names: label_names, palette, are_labels } = self.legend(channel, number);
+        let legend = self.legend(channel, number);
+        let label_names = legend.label_names(None);
+        let Legend { palette, are_labels, .. } = legend;
         let orientation = self.orientation.filter(|_| number == 0);
         let channels = if series.is_color { 1 } else { series.channels };
         let display = self.displays.get(channel).filter(|display| **display != ChannelDisplay::default());

@@ -21,10 +21,9 @@ use super::source::{MAX_HEADER, Source};
 use super::stream::Stream;
 use super::text::{number, shown};
 use super::unit::{self, NON_UNIFORM, unit, warn_of_itk};
-use super::voxel::Voxel;
 
 /// Reads one MetaImage file, or the header and the data file it names.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
     let series = header.series()?;
@@ -36,14 +35,14 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         let bytes = samples.bytes().saturating_mul(series.count());
         let before_the_end = stream.exactly_left().unwrap_or(0).saturating_sub(bytes);
         stream.skip(header_size.unwrap_or(before_the_end))?;
-        stream.series::<T>(samples, &series, false)
+        stream.series(samples, &series, false)
     };
     let values = match header.data_files(&samples)? {
         Some(files) if series.count() > 1 && files.count() > 1 => {
             let found = format!("{} volumes in {} files", series.count(), files.count());
             return Err(header.0.invalid("ElementDataFile", found, "one file of several channels or times"));
         }
-        Some(files) => files.read::<T>(path, "ElementDataFile", &samples, access, read)?,
+        Some(files) => files.read(path, "ElementDataFile", &samples, access, read)?,
         None => read(file, &samples)?,
     };
     let Samples { dims, kind, .. } = samples;

@@ -17,7 +17,6 @@ use super::samples::Samples;
 use super::series::Series;
 use super::shear::{self, Lattice};
 use super::stream::Stream;
-use super::voxel::Voxel;
 
 /// The size of the header in bytes.
 const HEADER: u64 = 284;
@@ -30,7 +29,7 @@ const TYPES: [(i32, SampleType); 4] =
 const DIRECTIONS: &str = "x_ras, y_ras, z_ras";
 
 /// Reads a file, whose frames are times.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let mut file = access.open(path)?;
     let is_gzip = file.reader.fill_buf().map_err(io_error(path))?.starts_with(&[0x1f, 0x8b]);
     let mut stream = if is_gzip { Stream::gzip(file)? } else { Stream::raw(file)? };
@@ -63,7 +62,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     let samples = Samples { kind, dims, big_endian: true, rescale: None, z_fastest: false };
     let orientation = Some(Orientation { axes: lattice.axes, origin });
     let (spacing, unit) = (Some(lattice.spacing), Some("mm".to_owned()));
-    let loaded = Loaded::new(dims, kind, stream.series::<T>(&samples, &series, true)?);
+    let loaded = Loaded::new(dims, kind, stream.series(&samples, &series, true)?);
     let loaded = Loaded { spacing, unit, orientation, series, ..loaded };
     lattice.straighten(path, DIRECTIONS, loaded, access)
 }

@@ -22,7 +22,8 @@ use super::samples::Samples;
 use super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::shear::{self, Lattice};
 use super::stream::Stream;
-use super::voxel::Voxel;
+use super::value_slice::ValueSlice;
+use super::voxels::{Voxels, Wanted};
 
 /// The format's codes of data types, and the bits of each.
 const TYPES: [(i64, SampleType); 10] = [
@@ -54,7 +55,7 @@ const LABELS: i64 = 1002;
 const SFORM: &str = "srow_x, srow_y, srow_z";
 
 /// Reads a single file, or a pair of files by the name of either.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let header_path = sibling(path, ".img", ".hdr").unwrap_or_else(|| path.to_owned());
     let mut stream = open(&header_path, access)?;
     let header = Header::read(&header_path, &mut stream)?;
@@ -78,9 +79,9 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         return Err(header.invalid("dim", format!("{:?}", header.dim), "one volume of complex samples"));
     } else if is_complex {
         log::warn!("{}: the samples are complex: the values are their magnitudes", path.display());
-        magnitudes::<T>(&header, &samples, stream, access)?
+        magnitudes(&header, &samples, stream, access)?
     } else {
-        stream.series::<T>(&samples, &series, false)?
+        stream.series(&samples, &series, false)?
     };
     let (spacing, unit) = (Some(lattice.spacing), header.unit());
     let legends = vec![Legend { are_labels: header.intent_code == LABELS, ..Legend::default() }];
@@ -88,27 +89,32 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     lattice.straighten(path, SFORM, loaded, access)
 }
 
+/// The complex samples whose magnitudes are computed at a time.
+const BLOCK: usize = 1 << 14;
+
 /// The magnitudes of complex samples, each a real and an imaginary part. Slope and intercept are applied first: the slope to both
 /// parts, the intercept to the real part.
-fn magnitudes<T: Voxel>(
-    header: &Header,
-    samples: &Samples,
-    stream: Stream,
-    access: &Access,
-) -> Result<T::Many, VolumeError> {
+fn magnitudes(header: &Header, samples: &Samples, mut stream: Stream, access: &Access) -> Result<Voxels, VolumeError> {
     let UVec3 { x, y, z } = samples.dims;
     let dims = dims_of([2 * u64::from(x), y.into(), z.into()])
         .ok_or_else(|| header.invalid("dim", samples.dims, "at most 2147483647 complex voxels"))?;
-    let parts = stream.samples::<f32>(&Samples { dims, rescale: None, ..*samples }, false)?;
+    stream.access = access.wanting(Wanted::Values);
+    let parts = stream.samples(&Samples { dims, rescale: None, ..*samples }, false)?.into_values();
     let [slope, intercept] = samples.rescale.unwrap_or([1.0, 0.0]);
-    samples.reserve::<T>(&header.path, access)?;
-    let mut values = Vec::new();
-    for pair in parts.as_slice().chunks(2) {
-        let [real, imaginary] = pair.run(0);
-        let magnitude = libm::hypot(f64::from(real) * slope + intercept, f64::from(imaginary) * slope);
-        values.push(T::of(magnitude).ok_or_else(|| header.invalid("data", magnitude, T::ALLOWED))?);
+    samples.reserve(&header.path, access)?;
+    let mut values = access.wanted().none();
+    let of = Samples { kind: SampleType::F64, big_endian: false, rescale: None, ..*samples };
+    let parts = parts.as_slice();
+    for from in (0..parts.len()).step_by(2 * BLOCK) {
+        let pairs = parts.slice(from..parts.len().min(from + 2 * BLOCK));
+        let magnitude = |pair: ValueSlice<'_>| {
+            let [real, imaginary] = pair.run(0);
+            libm::hypot(f64::from(real) * slope + intercept, f64::from(imaginary) * slope)
+        };
+        let bytes: Vec<u8> = pairs.chunks(2).flat_map(|pair| magnitude(pair).to_le_bytes()).collect();
+        of.append(&header.path, &bytes, &mut values)?;
     }
-    Ok(values.into())
+    Ok(values)
 }
 
 /// The file's name with the ending `from`, or `from` and `.gz`, replaced by `to`; `None` if it ends otherwise. The new ending is in

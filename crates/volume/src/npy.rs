@@ -21,7 +21,6 @@ use super::source::MAX_HEADER;
 use super::stream::Stream;
 use super::text::shown;
 use super::values::Values;
-use super::voxel::Voxel;
 
 /// The names of types. Truth is a byte, 0 or 1.
 const TYPES: [(&str, SampleType); 12] = [
@@ -49,9 +48,9 @@ pub struct Array {
     pub values: Values,
 }
 
-impl From<Loaded<f32>> for Array {
-    fn from(Loaded { dims, kind, values, .. }: Loaded<f32>) -> Self {
-        Self { dims, kind, values }
+impl From<Loaded> for Array {
+    fn from(Loaded { dims, kind, values, .. }: Loaded) -> Self {
+        Self { dims, kind, values: values.into_values() }
     }
 }
 
@@ -61,15 +60,15 @@ pub fn array(path: &Path, access: &Access) -> Result<Array, VolumeError> {
 }
 
 /// Reads the volume of one file.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     read_array(path, Stream::raw(access.open(path)?)?)
 }
 
 /// Reads an array from the beginning of its header.
-pub(super) fn read_array<T: Voxel>(path: &Path, mut stream: Stream) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read_array(path: &Path, mut stream: Stream) -> Result<Loaded, VolumeError> {
     let (samples, series) = parse(path, &header(path, &mut stream)?)?;
     let Samples { dims, kind, .. } = samples;
-    let values = stream.series::<T>(&samples, &series, false)?;
+    let values = stream.series(&samples, &series, false)?;
     Ok(Loaded { series, assumed_axes: Some(ASSUMED_AXES), ..Loaded::new(dims, kind, values) })
 }
 

@@ -9,7 +9,6 @@ use super::error::volume::invalid;
 use super::loaded::Loaded;
 use super::npy::{self, Array};
 use super::text::shown;
-use super::voxel::Voxel;
 use super::zip::Directory;
 use super::zip::Member;
 
@@ -17,7 +16,7 @@ use super::zip::Member;
 const SHOWN: usize = 12;
 
 /// Reads the only array of a file, or the one that the path names after a colon: `file.npz:name`.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let (archive, wanted) = archive_and_inner(path);
     let mut file = access.open(archive)?;
     let members = Directory::read(&mut file)?.members(&mut file, ".npy")?;

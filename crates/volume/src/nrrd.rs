@@ -25,13 +25,13 @@ use super::source::{MAX_HEADER, Source};
 use super::stream::Stream;
 use super::text::{lower, shown, three, vector};
 use super::unit::{self, NON_UNIFORM, warn_of_itk};
-use super::voxel::Voxel;
+use super::voxels::Voxels;
 
 /// The field with the axes, which need not be at right angles.
 const DIRECTIONS: &str = "space directions";
 
 /// Reads one NRRD file, or the detached header and the data file it names.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let mut file = access.open(path)?;
     let header = Header::read(&mut file)?;
     let axes = header.axes()?;
@@ -43,9 +43,10 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         Some(files) if axes.series.count() > 1 && files.count() > 1 => {
             return Err(header.0.invalid("data file", format!("{} files", files.count()), "one file of four axes"));
         }
-        Some(files) => files
-            .read::<T>(path, "data file", &layout.samples, access, |file, samples| layout.read::<T>(file, samples))?,
-        None => layout.read::<T>(file, &layout.samples)?,
+        Some(files) => {
+            files.read(path, "data file", &layout.samples, access, |file, samples| layout.read(file, samples))?
+        }
+        None => layout.read(file, &layout.samples)?,
     };
     let loaded = Loaded::new(dims, layout.samples.kind, values);
     let spacing = lattice.map(|lattice| lattice.spacing);
@@ -288,13 +289,12 @@ impl Header {
             Some(DVec3::new(red, green, blue))
                 .filter(|color| color.cmpge(DVec3::ZERO).all() && color.cmple(DVec3::ONE).all())
         };
-        let colors: BTreeMap<u16, DVec3> =
-            self.segments("_Color", layer).filter_map(|(label, text)| Some((label, color(text)?))).collect();
-        (!colors.is_empty()).then(|| colors.into_iter().map(|(label, color)| (f64::from(label), color)).collect())
+        let colors = self.segments("_Color", layer).filter_map(|(label, text)| Some((label as f64, color(text)?)));
+        Legend::ascending(colors.collect())
     }
 
     /// The labels of the segments of a layer, or of all, and what is said of each by a key with some end.
-    fn segments(&self, end: &str, layer: Option<u32>) -> impl Iterator<Item = (u16, &String)> {
+    fn segments(&self, end: &str, layer: Option<u32>) -> impl Iterator<Item = (u64, &String)> {
         self.1.iter().filter_map(move |(key, value)| {
             let segment = key.strip_suffix("_LabelValue").filter(|segment| segment.starts_with("Segment"))?;
             // One that states no layer lies in the first.
@@ -445,7 +445,7 @@ struct Layout {
 
 impl Layout {
     /// Reads the samples in one file.
-    fn read<T: Voxel>(&self, mut file: Source, samples: &Samples) -> Result<T::Many, VolumeError> {
+    fn read(&self, mut file: Source, samples: &Samples) -> Result<Voxels, VolumeError> {
         file.skip_lines(self.line_skip)?;
         if matches!(self.encoding, Encoding::Text | Encoding::Hex) {
             file.skip(self.byte_skip.unwrap_or_default())?;
@@ -456,15 +456,15 @@ impl Layout {
             #[cfg(feature = "bzip2")]
             Encoding::Bzip2 => Stream::bzip2(file),
             Encoding::Text => {
-                return Stream::text(file, samples.kind, TextEnd::File)?.series::<T>(samples, &self.series, false);
+                return Stream::text(file, samples.kind, TextEnd::File)?.series(samples, &self.series, false);
             }
-            Encoding::Hex => return Stream::hex(file)?.series::<T>(samples, &self.series, false),
+            Encoding::Hex => return Stream::hex(file)?.series(samples, &self.series, false),
         };
         let bytes = samples.bytes().saturating_mul(self.series.count());
         let before_the_end = |left: u64| left.saturating_sub(bytes);
         stream.skip(self.byte_skip.unwrap_or_else(|| stream.exactly_left().map_or(0, before_the_end)))?;
         // Beyond the samples a compressed stream must end.
-        stream.series::<T>(samples, &self.series, self.window && self.encoding == Encoding::Raw)
+        stream.series(samples, &self.series, self.window && self.encoding == Encoding::Raw)
     }
 }
 

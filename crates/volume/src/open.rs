@@ -9,10 +9,12 @@ use super::access::{Access, ReadOptions};
 use super::error::volume::{VolumeError, invalid, refused};
 use super::format;
 use super::loaded::{Levels, Loaded};
+use super::numbered::are_beyond_16_bits;
 use super::store::{Store, StoreFacts};
 use super::texel::COLOR_BYTES;
 use super::values::Values;
 use super::volume::Volume;
+use super::voxels::Wanted;
 
 impl Volume {
     /// Reads a volume file. Its first bytes determine the format, or else its extension: NRRD (`.nrrd`, `.nhdr`), and, each with the
@@ -38,7 +40,7 @@ impl Volume {
 
     #[doc(hidden)]
     pub fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        let (format, loaded) = format::read::<f32>(path, access)?;
+        let (format, loaded) = format::read(path, &access.wanting(Wanted::Values))?;
         let first_channel = access.selection().channel.unwrap_or(0) as usize;
         let channels = first_channel..(loaded.series.channels as usize).max(first_channel + 1);
         let facts = |(at, channel): (usize, usize)| {
@@ -47,10 +49,19 @@ impl Volume {
         };
         let mut facts = channels.enumerate().map(facts).collect::<Vec<StoreFacts>>().into_iter();
         let is_left_handed = loaded.is_left_handed();
-        let Loaded { dims, kind: sample_type, spacing, series, levels, mut values, .. } = loaded;
+        let legend = loaded.legend(first_channel, 0);
+        let Loaded { dims, kind: sample_type, spacing, series, levels, values, .. } = loaded;
+        let mut values = values.into_values();
         let origin = path.display().to_string();
         let spacing = access.spacing().or(spacing).unwrap_or(DVec3::ONE);
-        access.take_rounding().warn(path, sample_type, values.as_slice());
+        let rounding = access.take_rounding();
+        let is_single = values.as_slice().len() == dims.element_product() as usize;
+        // Pages, which are to be small, take large ids for values, and say that these are rounded.
+        let may_be_ids =
+            cfg!(not(target_arch = "wasm32")) && is_single && !series.is_color && are_beyond_16_bits(values.as_slice());
+        if !may_be_ids {
+            rounding.warn(path, sample_type, values.as_slice());
+        }
         if series.is_color {
             let bytes = COLOR_BYTES * u64::from(dims.element_product());
             access.reserve(path, "data", format!("{dims} voxels with colours"), bytes)?;
@@ -70,6 +81,12 @@ impl Volume {
             Self::from_values(&origin, dims, spacing, values)?.stating(&origin, facts.next().unwrap_or_default())
         };
         let mut first = channel(values)?;
+        if may_be_ids {
+            match first.labels_beyond_16_bits(path, &legend, access) {
+                Some(labels) => first = first.with_numbered(labels),
+                None => rounding.warn(path, sample_type, first.values()),
+            }
+        }
         let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
         if let Some(Levels { dims, level, grid, reads }) = levels {
             let grid = access.spacing().map_or(grid, |spacing| grid.with_finest_spacing(spacing));

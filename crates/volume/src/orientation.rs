@@ -42,6 +42,12 @@ pub enum PatientSide {
 }
 
 impl Orientation {
+    /// The orientation of axes and an origin that a file states in LPS.
+    #[cfg(feature = "dicom")]
+    pub(super) fn of_lps(axes: DMat3, origin: DVec3) -> Self {
+        Self { axes: DMat3::from_diagonal(RAS_FROM_LPS) * axes, origin: RAS_FROM_LPS * origin }
+    }
+
     /// `Camera::direction` and `Camera::up`, in world space, that show this side of the patient.
     pub fn direction_and_up(&self, view: PatientSide) -> [DVec3; 2] {
         let ras = match view {

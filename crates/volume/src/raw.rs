@@ -60,7 +60,7 @@ impl Volume {
         let mut stream = Stream::raw(access.open(path)?)?;
         stream.skip(offset)?;
         let samples = Samples { kind, dims, big_endian, rescale: None, z_fastest: false };
-        let values = stream.samples::<f32>(&samples, false)?;
+        let values = stream.samples(&samples, false)?.into_values();
         access.take_rounding().warn(path, kind, values.as_slice());
         let origin = path.display().to_string();
         Self::from_values(&origin, dims, DVec3::ONE, values)?.stating(&origin, facts(kind))

@@ -141,13 +141,16 @@ impl Volume {
             (0..count).into_par_iter().map(|index| color(place(index))).numbers().into()
         });
         let resampled = Self::new(key, dims, grid.spacing(), values)?;
-        let Self { label_names, unit, value_unit, encoding, palette, channel_name, display, .. } = self;
+        let Self { label_names, label_colors, label_ids, .. } = self;
+        let Self { unit, value_unit, encoding, palette, channel_name, display, .. } = self;
         let orientation = grid.orientation().copied();
         Ok(Self {
             colors,
             labels,
             is_label_map: resampling == Resampling::Nearest,
             label_names,
+            label_colors,
+            label_ids,
             unit,
             value_unit,
             encoding,

@@ -9,6 +9,9 @@ pub trait Sample: Copy {
     /// The nearest `f64`.
     fn to_f64(self) -> f64;
 
+    /// The number if it is whole and at least 0: the id of a label.
+    fn to_id(self) -> Option<u64>;
+
     /// Whether all numbers of the type are whole.
     const IS_WHOLE: bool;
 
@@ -56,6 +59,14 @@ macro_rules! primitive_samples {
                 self as f64
             }
 
+            fn to_id(self) -> Option<u64> {
+                // Every other type has a double for each of its numbers.
+                if Self::IS_WHOLE && size_of::<$type>() == 8 {
+                    return (self as f64 >= 0.0).then_some(self as u64);
+                }
+                id_of(self as f64)
+            }
+
             const IS_WHOLE: bool = 0.5_f64 as $type as f64 == 0.0;
             const MAY_ROUND: bool = size_of::<$type>() > 4 || size_of::<$type>() == 4 && Self::IS_WHOLE;
 
@@ -65,6 +76,13 @@ macro_rules! primitive_samples {
             }
         })*
     };
+}
+
+/// The whole number from 0 on that a double is, if it is one.
+fn id_of(value: f64) -> Option<u64> {
+    const END: f64 = 18_446_744_073_709_551_616.0;
+    let id = value as u64;
+    ((0.0..END).contains(&value) && id as f64 == value).then_some(id)
 }
 
 sample_types!(
@@ -93,6 +111,10 @@ impl Sample for crate::half::Half {
 
     fn to_f64(self) -> f64 {
         self.value().into()
+    }
+
+    fn to_id(self) -> Option<u64> {
+        self.value().to_id()
     }
 
     fn error_if_whole(self) -> f64 {

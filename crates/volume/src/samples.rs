@@ -11,6 +11,7 @@ use super::grid::Grid;
 use super::rounding::Rounding;
 use super::sample_type::{Sample, SampleType, for_sample_type};
 use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 
 /// The voxels that are converted at a time.
 const BLOCK: usize = 1 << 14;
@@ -45,26 +46,28 @@ impl Samples {
     }
 
     /// The file's samples reordered so that x is fastest.
-    pub(super) fn in_order<T: Voxel>(&self, path: &Path, samples: T::Many) -> Result<T::Many, VolumeError> {
+    pub(super) fn in_order(&self, path: &Path, samples: Voxels) -> Result<Voxels, VolumeError> {
         if !self.z_fastest {
             return Ok(samples);
         }
         let [nx, ny, nz] = self.dims.to_array().map(|n| n as usize);
         let rows = (0..nz).flat_map(|z| (0..ny).map(move |y| z + nz * y));
         let indices = rows.flat_map(|first| (0..nx).map(move |x| first + nz * ny * x));
-        let mut sorted = T::Many::default();
+        let mut sorted = samples.none_alike();
         sorted.try_reserve_exact(samples.count()).map_err(self.too_many(path))?;
         sorted.append_from(&samples, indices).map_err(self.too_many(path))?;
         Ok(sorted)
     }
 
     /// Converts all of `bytes` and appends the voxels to `into`, which holds those before. Returns what they lose.
-    pub(super) fn append<T: Voxel>(
-        &self,
-        path: &Path,
-        bytes: &[u8],
-        into: &mut T::Many,
-    ) -> Result<Rounding, VolumeError> {
+    pub(super) fn append(&self, path: &Path, bytes: &[u8], into: &mut Voxels) -> Result<Rounding, VolumeError> {
+        match into {
+            Voxels::Values(values) => self.append_to::<f32>(path, bytes, values),
+            Voxels::Ids(ids) => self.append_to::<u64>(path, bytes, ids),
+        }
+    }
+
+    fn append_to<T: Voxel>(&self, path: &Path, bytes: &[u8], into: &mut T::Many) -> Result<Rounding, VolumeError> {
         let mut rounding = Rounding::default();
         let mut voxels = Vec::new();
         for bytes in bytes.chunks(BLOCK * self.kind.bytes() as usize) {

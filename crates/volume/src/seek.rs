@@ -15,7 +15,7 @@ use super::samples::Samples;
 use super::series::SeriesOrder;
 use super::store::{Store, StoreLevel, check_box, check_chunk, values_of};
 use super::texel::{COLOR_BYTES, luminance, texel};
-use super::voxel::Voxel;
+use super::voxels::Wanted;
 use super::{Grid, StoreFacts, Texel, VolumeError};
 
 /// The sizes of a chunk, unless the volume is smaller: any box can be read, so these only divide it into parts of a convenient size. Colours are larger than
@@ -48,7 +48,7 @@ impl FileStore {
     /// The stores of the selected channels of a file whose header was read, of which `notes` tells where the samples are.
     pub(super) fn of_header(
         path: &Path,
-        (format, loaded): (&'static str, &Loaded<f32>),
+        (format, loaded): (&'static str, &Loaded),
         notes: &[Located],
         access: &Access,
     ) -> Result<Vec<Arc<dyn Store>>, VolumeError> {
@@ -242,7 +242,7 @@ impl Store for FileStore {
 
     fn memory(&self, level: usize) -> u64 {
         let Samples { kind, rescale, .. } = &self.located.samples;
-        let own = f32::bytes(*kind, rescale.is_some());
+        let own = Wanted::Values.bytes(*kind, rescale.is_some());
         let of_color = self.firsts.len() as u64 * own + COLOR_BYTES;
         values_of(&self.levels, level).saturating_mul(if self.has_colors() { of_color } else { own })
     }

@@ -8,7 +8,7 @@ use std::path::Path;
 use super::VolumeError;
 use super::error::volume::invalid;
 #[cfg(any(feature = "dicom", feature = "tiff"))]
-use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 
 /// The maximum number of channels in a file.
 pub(super) const MAX_CHANNELS: u32 = 64;
@@ -108,11 +108,11 @@ impl Series {
 /// # Errors
 /// If there is no memory for a copy of them.
 #[cfg(any(feature = "dicom", feature = "tiff"))]
-pub(super) fn apart<T: Voxel>(numbers: T::Many, count: usize) -> Result<T::Many, TryReserveError> {
+pub(super) fn apart(numbers: Voxels, count: usize) -> Result<Voxels, TryReserveError> {
     if count == 1 {
         return Ok(numbers);
     }
-    let mut sorted = T::Many::default();
+    let mut sorted = numbers.none_alike();
     let indices = (0..count).flat_map(|first| (first..numbers.count()).step_by(count));
     sorted.append_from(&numbers, indices)?;
     Ok(sorted)

@@ -5,6 +5,7 @@
 //! its planes, and each sample moves only within its plane: in a CT scan with a tilted gantry, within its slice. So one bilinear
 //! interpolation per voxel undoes any shear.
 
+use std::collections::TryReserveError;
 use std::path::Path;
 
 use glam::{DMat3, DVec3, UVec3};
@@ -13,9 +14,10 @@ use super::VolumeError;
 use super::access::Access;
 use super::error::volume::invalid;
 use super::grid::dims_of;
-use super::loaded::Loaded;
+use super::loaded::{Legend, Loaded};
 use super::orientation::{MAX_COSINE, lengths_and_directions};
 use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 use crate::parallel::prelude::*;
 
 /// The maximum angle in degrees between an axis and its orthogonal direction. Flatter volumes have damaged headers.
@@ -111,13 +113,13 @@ impl Lattice {
     ///
     /// # Errors
     /// If the orthogonal grid has too many voxels. `field` is the file's field with the axes.
-    pub(super) fn straighten<T: Voxel>(
+    pub(super) fn straighten(
         &self,
         path: &Path,
         field: &str,
-        loaded: Loaded<T>,
+        loaded: Loaded,
         access: &Access,
-    ) -> Result<Loaded<T>, VolumeError> {
+    ) -> Result<Loaded, VolumeError> {
         let Some(shear) = self.shear else { return Ok(loaded) };
         if access.is_noting() {
             let found = format!("axes sheared by {:.2}°", shear.degrees);
@@ -136,31 +138,29 @@ impl Lattice {
         };
         let Some(dims) = dims else { return Err(too_many(format!("an orthogonal grid of {sizes:?} voxels"))) };
         // Between samples values are no whole numbers.
-        let bytes = u64::from(dims.element_product()) * size_of::<T>() as u64;
+        let bytes = u64::from(dims.element_product()) * access.wanted().alone();
         access.reserve(path, field, format!("an orthogonal grid of {dims} voxels"), bytes)?;
-        let mut values = Vec::new();
-        let reserved = values.try_reserve_exact(dims.element_product() as usize);
-        reserved.map_err(|error| too_many(format!("an orthogonal grid of {dims} voxels: {error}")))?;
         log::warn!(
             "{}: sheared by {degrees:.2}°: resampled to an orthogonal grid of {dims} voxels, with holes beside the samples",
             path.display()
         );
         let first = DVec3::from_array(ranges.map(|[first, _]| first));
-        values.resize(dims.element_product() as usize, T::HOLE);
-        let source = Samples::<T> { dims: loaded.dims, values: &loaded.values };
-        let rows = values.par_chunks_mut(dims.x as usize).enumerate();
-        rows.for_each(|(row, values)| {
-            let (y, z) = (row as u32 % dims.y, row as u32 / dims.y);
-            for (x, value) in values.iter_mut().enumerate() {
-                let place = shear.in_source(UVec3::new(x as u32, y, z).as_dvec3() + first);
-                *value = source.at(place, shear.order).unwrap_or(T::HOLE);
+        let is_nearest = loaded.legends.iter().any(Legend::is_of_labels);
+        let from = loaded.dims;
+        let values = match &loaded.values {
+            Voxels::Values(values) => {
+                shear.resampled(&Samples::<f32> { dims: from, values, is_nearest }, first, dims).map(Voxels::from)
             }
-        });
+            Voxels::Ids(values) => {
+                shear.resampled(&Samples::<u64> { dims: from, values, is_nearest }, first, dims).map(Voxels::from)
+            }
+        };
+        let values = values.map_err(|error| too_many(format!("an orthogonal grid of {dims} voxels: {error}")))?;
         let mut orientation = loaded.orientation;
         if let Some(orientation) = &mut orientation {
             orientation.origin += orientation.axes * (first * self.spacing);
         }
-        Ok(Loaded { dims, orientation, values: values.into(), ..loaded })
+        Ok(Loaded { dims, orientation, values, ..loaded })
     }
 }
 
@@ -171,6 +171,30 @@ fn split(vector: DVec3) -> (DVec3, f64) {
 }
 
 impl Shear {
+    /// Voxels on the orthogonal grid of some dimensions, whose first one lies at a place.
+    ///
+    /// # Errors
+    /// If there is no memory for them.
+    fn resampled<T: Voxel>(
+        &self,
+        source: &Samples<'_, T>,
+        first: DVec3,
+        dims: UVec3,
+    ) -> Result<T::Many, TryReserveError> {
+        let mut values = Vec::new();
+        values.try_reserve_exact(dims.element_product() as usize)?;
+        values.resize(dims.element_product() as usize, T::HOLE);
+        let rows = values.par_chunks_mut(dims.x as usize).enumerate();
+        rows.for_each(|(row, values)| {
+            let (y, z) = (row as u32 % dims.y, row as u32 / dims.y);
+            for (x, value) in values.iter_mut().enumerate() {
+                let place = self.in_source(UVec3::new(x as u32, y, z).as_dvec3() + first);
+                *value = source.at(place, self.order).unwrap_or(T::HOLE);
+            }
+        });
+        Ok(values.into())
+    }
+
     /// The first and last voxel along each axis of the orthogonal grid that lie in a sample's cell. Voxel 0 is at sample 0.
     fn ranges(&self, dims: UVec3) -> [[f64; 2]; 3] {
         let [a, b, c] = self.order;
@@ -205,6 +229,8 @@ impl Shear {
 struct Samples<'a, T: Voxel> {
     dims: UVec3,
     values: &'a T::Many,
+    /// Whether places between samples have the nearest one.
+    is_nearest: bool,
 }
 
 impl<T: Voxel> Samples<'_, T> {
@@ -215,12 +241,15 @@ impl<T: Voxel> Samples<'_, T> {
         let (i, i_part) = cell(place[a], self.dims[a])?;
         let (j, j_part) = cell(place[b], self.dims[b])?;
         let sample = |i: usize, j: usize| self.values.at(plane + i * strides[a] + j * strides[b]);
+        let behind = |part: f64| usize::from(part >= 0.5);
         let row = |j: usize| match i_part {
             0.0 => sample(i, j),
+            part if self.is_nearest => sample(i + behind(part), j),
             part => sample(i, j).between(sample(i + 1, j), part),
         };
         Some(match j_part {
             0.0 => row(j),
+            part if self.is_nearest => row(j + behind(part)),
             part => row(j).between(row(j + 1), part),
         })
     }
@@ -246,12 +275,12 @@ mod tests {
     use super::super::sample_type::SampleType;
     use super::*;
 
-    fn loaded<T: Voxel>(dims: UVec3, lattice: &Lattice, origin: DVec3, values: Vec<T>) -> Loaded<T> {
+    fn loaded(dims: UVec3, lattice: &Lattice, origin: DVec3, values: impl Into<Voxels>) -> Loaded {
         let orientation = Some(Orientation { axes: lattice.axes, origin });
         Loaded { spacing: Some(lattice.spacing), orientation, ..Loaded::new(dims, SampleType::F32, values.into()) }
     }
 
-    fn straighten<T: Voxel>(dims: UVec3, steps: [DVec3; 3], values: Vec<T>) -> Loaded<T> {
+    fn straighten(dims: UVec3, steps: [DVec3; 3], values: impl Into<Voxels>) -> Loaded {
         let lattice = Lattice::of(steps).unwrap();
         let access = Access::new(&ReadOptions::default()).unwrap();
         lattice.straighten(Path::new("here"), "axes", loaded(dims, &lattice, DVec3::ZERO, values), &access).unwrap()
@@ -268,7 +297,7 @@ mod tests {
         let steps = [DVec3::new(0.0, 2.0, 0.0), DVec3::new(3.0, 0.0, 0.0002), DVec3::new(0.0, 0.0, 4.0)];
         let result = straighten(UVec3::new(2, 1, 1), steps, vec![1.0_f32, 2.0]);
         assert_eq!(result.dims, UVec3::new(2, 1, 1));
-        assert_eq!(result.values.as_slice(), [1.0, 2.0]);
+        assert_eq!(result.values.values(), [1.0, 2.0]);
     }
 
     /// Slices that a tilted gantry moves by one row each, and by half a row.
@@ -282,7 +311,7 @@ mod tests {
         assert_eq!((whole.dims, whole.spacing), (UVec3::new(1, 4, 3), Some(DVec3::new(1.0, 2.0, 4.0))));
         let expected = [0.0, 1.0, hole, hole, hole, 10.0, 11.0, hole, hole, hole, 20.0, 21.0];
         assert!(
-            whole.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            whole.values.values().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
             "{:?}",
             whole.values
         );
@@ -291,7 +320,7 @@ mod tests {
         assert_eq!(back.orientation.unwrap().origin, DVec3::new(0.0, -4.0, 0.0));
         let expected = [hole, hole, 0.0, 1.0, hole, 10.0, 11.0, hole, 20.0, 21.0, hole, hole];
         assert!(
-            back.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            back.values.values().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
             "{:?}",
             back.values
         );
@@ -300,7 +329,7 @@ mod tests {
         // Half a row off, the outer halves of the outermost cells have their samples' values.
         let expected = [0.0, 1.0, hole, 10.0, 10.5, 11.0, hole, 20.0, 21.0];
         assert!(
-            half.values.as_slice().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
+            half.values.values().iter().zip(expected).all(|(a, b)| a.to_bits() == b.to_bits()),
             "{:?}",
             half.values
         );
@@ -321,14 +350,14 @@ mod tests {
                 }
             }
             let position = |place: DVec3| steps[0] * place.x + steps[1] * place.y + steps[2] * place.z;
-            let values = places(dims).map(|place| field(position(place)) as f32).collect();
+            let values: Vec<f32> = places(dims).map(|place| field(position(place)) as f32).collect();
             let result = straighten(dims, steps, values);
             let Orientation { axes, origin } = result.orientation.unwrap();
             let spacing = result.spacing.unwrap();
             assert!((axes.transpose() * axes).abs_diff_eq(DMat3::IDENTITY, 1e-12), "{mask}");
             let inverse = DMat3::from_cols(steps[0], steps[1], steps[2]).inverse();
             let (mut compared, mut held) = (0, 0);
-            for (place, value) in places(result.dims).zip(result.values.as_slice()) {
+            for (place, value) in places(result.dims).zip(result.values.values()) {
                 let at = origin + axes * (spacing * place);
                 let source = inverse * at;
                 let distance = (source - source.clamp(DVec3::ZERO, dims.as_dvec3() - 1.0)).abs().max_element();
@@ -362,13 +391,26 @@ mod tests {
         assert_eq!(Lattice::of(skew).unwrap().shear.unwrap().order, [0, 2, 1]);
     }
 
+    /// The right ones are those of [`labels_are_the_nearest_ones_and_holes_spread`].
+    #[test]
+    fn values_that_the_file_calls_labels_are_the_nearest_ones() {
+        let lattice = Lattice::of([DVec3::X, DVec3::Y, DVec3::new(0.25, 0.0, 1.0)]).unwrap();
+        let access = Access::new(&ReadOptions::default()).unwrap();
+        let values: Vec<f32> = (1..10).map(|label| label as f32).collect();
+        let legends = vec![Legend { are_labels: true, ..Legend::default() }];
+        let loaded = Loaded { legends, ..loaded(UVec3::new(3, 1, 3), &lattice, DVec3::ZERO, values) };
+        let straight = lattice.straighten(Path::new("here"), "axes", loaded, &access).unwrap();
+        let found = straight.values.values().iter().map(|value| if value.is_nan() { 0.0 } else { value });
+        assert!(found.eq([1.0, 2.0, 3.0, 0.0, 4.0, 5.0, 6.0, 0.0, 7.0, 8.0, 9.0, 9.0]));
+    }
+
     #[test]
     fn labels_are_the_nearest_ones_and_holes_spread() {
         let steps = [DVec3::X, DVec3::Y, DVec3::new(0.25, 0.0, 1.0)];
-        let labels = straighten(UVec3::new(3, 1, 3), steps, vec![1_u16, 2, 3, 4, 5, 6, 7, 8, 9]);
-        assert_eq!((labels.dims.x, labels.values), (4, vec![1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 9]));
+        let labels = straighten(UVec3::new(3, 1, 3), steps, vec![1_u64, 2, 3, 4, 5, 6, 7, 8, 9]);
+        assert_eq!((labels.dims.x, labels.values.ids()), (4, vec![1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9, 9]));
         let values = straighten(UVec3::new(3, 1, 2), steps, vec![1.0, 2.0, 3.0, 4.0, 5.0, f32::NAN]);
-        let found: Vec<bool> = values.values.as_slice().iter().map(|value| value.is_nan()).collect();
+        let found: Vec<bool> = values.values.values().iter().map(|value| value.is_nan()).collect();
         assert_eq!(found, [false, false, false, false, false, true]);
     }
 

@@ -19,14 +19,14 @@ use super::numbers::{Numbers, TextEnd};
 use super::sample_type::SampleType;
 use super::samples::Samples;
 use super::source::{CHUNK, Source};
-use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 
 /// Deflate spends at least 2 bits on a match of at most 258 bytes, so a stream expands at most by this factor.
 pub(super) const MAX_EXPANSION: u64 = 1032;
 
 impl Samples {
     /// Reserves the memory that their voxels take at most.
-    pub(super) fn reserve<T: Voxel>(&self, path: &Path, access: &Access) -> Result<(), VolumeError> {
+    pub(super) fn reserve(&self, path: &Path, access: &Access) -> Result<(), VolumeError> {
         let [x, y, z] = self.dims.to_array();
         // Reordering the axes needs a second copy.
         let copies = if self.z_fastest { 2 } else { 1 };
@@ -34,7 +34,7 @@ impl Samples {
             path,
             "data",
             format!("{x} × {y} × {z} voxels"),
-            copies * u64::from(self.count()) * T::bytes(self.kind, self.rescale.is_some()),
+            copies * u64::from(self.count()) * access.wanted().bytes(self.kind, self.rescale.is_some()),
         )
     }
 }
@@ -145,7 +145,7 @@ impl Stream {
     }
 
     /// The samples. The stream must end after them, unless it is a `window` into a file in which more may follow.
-    pub(super) fn samples<T: Voxel>(mut self, samples: &Samples, window: bool) -> Result<T::Many, VolumeError> {
+    pub(super) fn samples(mut self, samples: &Samples, window: bool) -> Result<Voxels, VolumeError> {
         let expected = samples.bytes();
         match self.exactly_left() {
             Some(left) if left < expected || left > expected && !window => {
@@ -156,8 +156,8 @@ impl Stream {
             }
             _ => {}
         }
-        samples.reserve::<T>(&self.path, &self.access)?;
-        let values = self.read_samples::<T>(samples)?;
+        samples.reserve(&self.path, &self.access)?;
+        let values = self.read_samples(samples)?;
         // Reading to the end also checks a compressed stream's last checksum.
         if let Reader::Decoder(reader, _) = &mut self.reader {
             let rest = if window { u64::MAX } else { 1 };
@@ -170,9 +170,9 @@ impl Stream {
         Ok(values)
     }
 
-    pub(super) fn read_samples<T: Voxel>(&mut self, samples: &Samples) -> Result<T::Many, VolumeError> {
+    pub(super) fn read_samples(&mut self, samples: &Samples) -> Result<Voxels, VolumeError> {
         let path = self.path.clone();
-        let (mut values, mut chunk) = (T::Many::default(), Vec::with_capacity(CHUNK as usize));
+        let (mut values, mut chunk) = (self.access.wanted().none(), Vec::with_capacity(CHUNK as usize));
         // An uncompressed file certainly holds all samples. What a compressed stream holds is unknown, so memory grows as it is decoded.
         let known = if self.exactly_left().is_some() { samples.count() as usize } else { 0 };
         values.try_reserve_exact(known).map_err(samples.too_many(&path))?;
@@ -184,11 +184,11 @@ impl Stream {
             if read < wanted {
                 return Err(samples.mismatch(&path, samples.bytes() - left + read));
             }
-            self.access.note_rounding(samples.append::<T>(&path, &chunk, &mut values)?);
+            self.access.note_rounding(samples.append(&path, &chunk, &mut values)?);
             left -= read;
         }
         values.shrink_to_fit();
-        samples.in_order::<T>(&path, values)
+        samples.in_order(&path, values)
     }
 
     /// Appends up to `bytes` bytes, fewer only at the end, and returns their number.

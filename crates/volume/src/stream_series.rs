@@ -6,27 +6,22 @@ use super::located::Located;
 use super::samples::Samples;
 use super::series::{Series, SeriesOrder};
 use super::stream::Stream;
-use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 
 impl Stream {
     /// The samples of the selected volumes of a series, channel by channel; `samples` are those of one volume. The stream must end after them as in
     /// [`Self::samples`].
-    pub(super) fn series<T: Voxel>(
-        mut self,
-        samples: &Samples,
-        series: &Series,
-        window: bool,
-    ) -> Result<T::Many, VolumeError> {
+    pub(super) fn series(mut self, samples: &Samples, series: &Series, window: bool) -> Result<Voxels, VolumeError> {
         let selection = self.access.selection();
         series.check(&self.path, selection)?;
         if self.access.is_noting() {
             let located = self.locate(samples, series)?;
             self.access.note(located);
-            return Ok(T::Many::default());
+            return Ok(self.access.wanted().none());
         }
         let channels = series.channels(selection);
         if series.count() == 1 {
-            return self.samples::<T>(samples, window);
+            return self.samples(samples, window);
         }
         let total = samples.bytes().saturating_mul(series.count());
         let is_wrong = |left: u64| left < total || left > total && !window;
@@ -39,21 +34,21 @@ impl Stream {
             SeriesOrder::Interleaved => {
                 self.skip(u64::from(time) * u64::from(series.channels) * samples.bytes())?;
                 let numbers = channels.map(u64::from);
-                return self.interleaved::<T>(samples, (series.channels.into(), numbers), window || series.times > 1);
+                return self.interleaved(samples, (series.channels.into(), numbers), window || series.times > 1);
             }
             #[cfg(feature = "npy")]
             SeriesOrder::TimesInChannels => {
                 let numbers = channels.map(|channel| u64::from(channel) * u64::from(series.times) + u64::from(time));
-                return self.interleaved::<T>(samples, (series.count(), numbers), window);
+                return self.interleaved(samples, (series.count(), numbers), window);
             }
             _ => {}
         }
-        let (mut values, mut at) = (T::Many::default(), 0);
+        let (mut values, mut at) = (self.access.wanted().none(), 0);
         for channel in channels {
             let block = series.block(channel, selection);
             self.skip((block - at) * samples.bytes())?;
-            samples.reserve::<T>(&self.path, &self.access)?;
-            let of_channel = self.read_samples::<T>(samples)?;
+            samples.reserve(&self.path, &self.access)?;
+            let of_channel = self.read_samples(samples)?;
             if values.count() == 0 {
                 values = of_channel;
             } else {
@@ -80,12 +75,12 @@ impl Stream {
     }
 
     /// The samples with some numbers, of `count` that each voxel has side by side.
-    fn interleaved<T: Voxel>(
+    fn interleaved(
         self,
         samples: &Samples,
         (count, numbers): (u64, impl Iterator<Item = u64>),
         window: bool,
-    ) -> Result<T::Many, VolumeError> {
+    ) -> Result<Voxels, VolumeError> {
         let [x, y, z] = samples.dims.to_array().map(u64::from);
         // They count as voxels along the axis that changes first.
         let sides = if samples.z_fastest { [x, y, z.saturating_mul(count)] } else { [x.saturating_mul(count), y, z] };
@@ -94,12 +89,12 @@ impl Stream {
             return Err(invalid(&self.path, "sizes", found, "at most 4294967295 samples"));
         };
         let (path, access) = (self.path.clone(), self.access.clone());
-        let all = self.samples::<T>(&Samples { dims, ..*samples }, window)?;
+        let all = self.samples(&Samples { dims, ..*samples }, window)?;
         // Those of a voxel lie together, or where z changes first, those of a slice.
         let together = if samples.z_fastest { (x * y) as usize } else { 1 };
-        let (count, mut values) = (count as usize, T::Many::default());
+        let (count, mut values) = (count as usize, all.none_alike());
         for number in numbers {
-            samples.reserve::<T>(&path, &access)?;
+            samples.reserve(&path, &access)?;
             let runs = (number as usize * together..all.count()).step_by(count * together);
             let appended = values.append_from(&all, runs.flat_map(|first| first..first + together));
             appended.map_err(samples.too_many(&path))?;

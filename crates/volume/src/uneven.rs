@@ -3,6 +3,7 @@
 use std::collections::TryReserveError;
 
 use super::voxel::{Many, Voxel};
+use super::voxels::Voxels;
 
 /// Distances up to this many of the smallest count as equal to it.
 const ALIKE: f64 = 1.1;
@@ -67,7 +68,14 @@ impl Even {
     ///
     /// # Errors
     /// If there is no memory for them.
-    pub(super) fn resampled<T: Voxel>(
+    pub(super) fn resampled(&self, values: &Voxels, inner: usize, samples: usize) -> Result<Voxels, TryReserveError> {
+        match values {
+            Voxels::Values(values) => Ok(self.resampled_of::<f32>(values, inner, samples)?.into()),
+            Voxels::Ids(ids) => Ok(self.resampled_of::<u64>(ids, inner, samples)?.into()),
+        }
+    }
+
+    fn resampled_of<T: Voxel>(
         &self,
         values: &T::Many,
         inner: usize,
@@ -102,10 +110,10 @@ mod tests {
         let even = Even::of(&[0.0, 2.0, 6.0, 8.0]).unwrap();
         assert_eq!(even, Even { step: 2.0, places: vec![(0, 0.0), (1, 0.0), (1, 0.5), (2, 0.0), (3, 0.0)] });
         let values = Values::from(vec![0.0, 1.0, 10.0, 11.0, 30.0, 31.0, 40.0, 41.0]);
-        let resampled = even.resampled::<f32>(&values, 2, 4).unwrap();
+        let resampled = even.resampled_of::<f32>(&values, 2, 4).unwrap();
         assert_eq!(resampled.as_slice(), [0.0, 1.0, 10.0, 11.0, 20.0, 21.0, 30.0, 31.0, 40.0, 41.0]);
-        let labels = even.resampled::<u16>(&vec![1, 2, 3, 4], 1, 4).unwrap();
-        assert_eq!(labels, [1, 2, 3, 3, 4]);
+        let labels = even.resampled_of::<u64>(&vec![1, 2, 3, 4].into(), 1, 4).unwrap();
+        assert_eq!((0..labels.count()).map(|at| labels.at(at)).collect::<Vec<_>>(), [1, 2, 3, 3, 4]);
     }
 
     /// A field that is linear along the axis stays as it is, wherever its samples lie.
@@ -114,7 +122,7 @@ mod tests {
         let positions = [-3.0, -1.0, 0.5, 1.0, 5.0, 6.25];
         let even = Even::of(&positions).unwrap();
         let values = Values::from(positions.map(|at| 3.0 * at as f32).to_vec());
-        let resampled = even.resampled::<f32>(&values, 1, positions.len()).unwrap();
+        let resampled = even.resampled_of::<f32>(&values, 1, positions.len()).unwrap();
         for (at, value) in resampled.as_slice().iter().enumerate() {
             let expected = 3.0 * (-3.0 + at as f64 * even.step);
             assert!((f64::from(value) - expected).abs() <= 3.0 * SAME_PLACE * even.step + 1e-5, "{at}: {value}");

@@ -146,6 +146,13 @@ impl Default for Values {
     }
 }
 
+#[cfg(target_arch = "wasm32")]
+impl From<Vec<u16>> for Values {
+    fn from(labels: Vec<u16>) -> Self {
+        Self::F32(labels.into_iter().map(f32::from).collect())
+    }
+}
+
 impl Values {
     /// All values.
     pub fn as_slice(&self) -> ValueSlice<'_> {

@@ -37,6 +37,10 @@ pub struct Volume {
     pub(super) colors: Option<Arc<[Texel]>>,
     pub(super) labels: Option<Arc<[u16]>>,
     pub(super) label_names: BTreeMap<u16, String>,
+    /// The colours of a segmented volume's labels, where its file states them.
+    pub(super) label_colors: Vec<(f64, DVec3)>,
+    /// The file's numbers of labels, which are the values or those of a segmented volume; `None` if they are the labels themselves.
+    pub(super) label_ids: Option<Arc<[u64]>>,
     /// Whether the values are known to be labels.
     pub(super) is_label_map: bool,
     /// The order of axes that was assumed, and whether the spacing was, because the file states none.
@@ -71,6 +75,7 @@ impl PartialEq for Volume {
         let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette, .. } = other;
         let Self { colors, channel_name, value_unit, display, further, levels, level, .. } = other;
         let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
+        let of_labels = (&other.label_ids, &other.label_colors);
         let channels = (colors, channel_name, value_unit, display, further, levels, level);
         let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
         let own = (
@@ -84,6 +89,7 @@ impl PartialEq for Volume {
         );
         facts == (grid, holes, labels, label_names, orientation, unit, encoding, palette)
             && channels == own
+            && of_labels == (&self.label_ids, &self.label_colors)
             && self.values().iter().zip(values.as_slice()).all(|(a, b)| a == b || a.is_nan() && b.is_nan())
     }
 }
@@ -165,6 +171,8 @@ impl Volume {
             colors: None,
             labels: None,
             label_names: BTreeMap::new(),
+            label_colors: Vec::new(),
+            label_ids: None,
             is_label_map: false,
             assumed_axes: None,
             is_spacing_assumed: false,

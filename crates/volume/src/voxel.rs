@@ -1,4 +1,4 @@
-//! The numbers that the samples of files become: values, or labels.
+//! The numbers that the samples of files become: values, or ids of labels.
 
 use std::collections::TryReserveError;
 
@@ -29,24 +29,6 @@ pub(super) trait Many<T>: Default + Sync + From<Vec<T>> {
     /// Exchanges two runs of `count` voxels, of which the first one ends before the other begins.
     #[cfg(feature = "tiff")]
     fn swap(&mut self, first: usize, other: usize, count: usize);
-
-    /// Appends those of others that have some indices.
-    ///
-    /// # Errors
-    /// As for [`Self::append`].
-    fn append_from(&mut self, others: &Self, indices: impl Iterator<Item = usize>) -> Result<(), TryReserveError> {
-        /// The voxels that are copied at a time.
-        const BLOCK: usize = 1 << 12;
-        let (mut indices, mut block) = (indices, Vec::with_capacity(BLOCK));
-        loop {
-            block.clear();
-            block.extend(indices.by_ref().take(BLOCK).map(|index| others.at(index)));
-            if block.is_empty() {
-                return Ok(());
-            }
-            self.append(&block)?;
-        }
-    }
 }
 
 /// Values, in the fewest bits that hold them.
@@ -77,37 +59,7 @@ impl Many<f32> for Values {
     }
 }
 
-/// Labels.
-impl Many<u16> for Vec<u16> {
-    fn count(&self) -> usize {
-        self.len()
-    }
-
-    fn at(&self, index: usize) -> u16 {
-        self[index]
-    }
-
-    fn try_reserve_exact(&mut self, count: usize) -> Result<(), TryReserveError> {
-        self.try_reserve_exact(count)
-    }
-
-    fn append(&mut self, voxels: &[u16]) -> Result<(), TryReserveError> {
-        self.try_reserve(voxels.len())?;
-        self.extend_from_slice(voxels);
-        Ok(())
-    }
-
-    fn shrink_to_fit(&mut self) {
-        self.shrink_to_fit();
-    }
-
-    #[cfg(feature = "tiff")]
-    fn swap(&mut self, first: usize, other: usize, count: usize) {
-        super::values::swap(self, first, other, count);
-    }
-}
-
-/// A number that samples are converted to: a value or a label.
+/// A number that samples are converted to: a value or the id of a label.
 pub(super) trait Voxel: Copy + Send + Sync {
     /// Many of them.
     type Many: Many<Self>;
@@ -149,29 +101,5 @@ impl Voxel for f32 {
     fn bytes(kind: SampleType, is_rescaled: bool) -> u64 {
         let whole = size_of::<Self>() as u64;
         if is_rescaled || cfg!(target_arch = "wasm32") { whole } else { kind.bytes().min(whole) }
-    }
-}
-
-/// A label.
-impl Voxel for u16 {
-    type Many = Vec<Self>;
-
-    const ALLOWED: &'static str = "labels, whole numbers from 0 to 65535";
-    const HOLE: Self = 0;
-    const HOLDS_ALL: bool = false;
-
-    fn of(sample: impl Sample) -> Option<Self> {
-        let sample = sample.to_f64();
-        let label = sample as Self;
-        (f64::from(label) == sample).then_some(label)
-    }
-
-    /// The nearer of the two labels.
-    fn between(self, other: Self, part: f64) -> Self {
-        if part < 0.5 { self } else { other }
-    }
-
-    fn bytes(_: SampleType, _: bool) -> u64 {
-        size_of::<Self>() as u64
     }
 }

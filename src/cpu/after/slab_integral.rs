@@ -173,8 +173,10 @@ impl Integrals {
         numbers: &Normalization,
     ) -> Self {
         let table = |label| Table::new(slab_integral::table(&transfer.tables(label), splatting, numbers));
-        let labels = has_labels.then(|| transfer.labels.keys()).into_iter().flatten();
-        let labels: BTreeMap<u16, Table> = labels.map(|&label| (label, table(Some(label)))).collect();
+        let mut labels = BTreeMap::new();
+        for &label in has_labels.then(|| transfer.labels.keys()).into_iter().flatten() {
+            labels.insert(label, table(Some(label)));
+        }
         let plain = table(None);
         let shown = labels.values().fold(plain.covered.shown, |[low, high], table| {
             [

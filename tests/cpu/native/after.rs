@@ -309,7 +309,7 @@ fn segmented(volume: &Volume) -> Volume {
 }
 
 /// One label has tables of its own, another one is hidden.
-fn labels() -> BTreeMap<u16, LabelTables> {
+fn labels() -> BTreeMap<u64, LabelTables> {
     let own = LabelTables {
         opacity: Some(Ramp::new(vec![(0.0, 0.0), (20.0, 0.4), (150.0, 0.8)]).unwrap()),
         color: Some(Ramp::new(vec![(0.0, DVec3::new(0.1, 0.9, 0.3))]).unwrap()),

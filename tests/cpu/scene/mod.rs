@@ -2,6 +2,7 @@
 
 mod classification;
 mod fitting;
+mod label_ids;
 mod refusals;
 
 use std::path::{Path, PathBuf};

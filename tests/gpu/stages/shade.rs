@@ -459,12 +459,14 @@ fn labels_have_their_own_tables() {
         let volume = labelled(&[first, second, third, rest]);
         let mut scene = oblique();
         scene.splatting.compositing = Compositing::Exponential;
-        scene.transfer.labels = [(first, own.clone()), (second, hidden.clone()), (third, colored.clone())].into();
+        scene.transfer.labels = [(first, own.clone()), (second, hidden.clone()), (third, colored.clone())]
+            .map(|(label, tables)| (u64::from(label), tables))
+            .into();
         check(&format!("labels up to {third}"), &volume, &scene);
         scene.transfer.gradient_opacity = Some(Ramp::new(vec![(20.0, 0.1), (70.0, 0.8)]).unwrap());
         scene.transfer.iso_ranges = Some(vec![[20.0, 150.0], [180.0, 250.0]]);
         check(&format!("labels up to {third}, iso-ranges"), &volume, &scene);
-        scene.transfer.labels = [(second, hidden.clone())].into();
+        scene.transfer.labels = [(u64::from(second), hidden.clone())].into();
         check(&format!("label {second} hidden"), &volume, &scene);
     }
 }

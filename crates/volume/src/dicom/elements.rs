@@ -12,7 +12,9 @@ use super::super::head::is_bare_dicom;
 use super::bytes::Bytes;
 use super::dataset::{Dataset, Tag, name, shown_tag, tags};
 
-const SEQUENCES: [Tag; 14] = [
+const SEQUENCES: [Tag; 16] = [
+    tags::SEGMENTS,
+    tags::SEGMENT_IDENTIFICATION,
     tags::GRADIENTS,
     tags::ECHO,
     tags::DIFFUSION,

@@ -16,7 +16,9 @@ pub(super) struct Frame {
     pub(super) directions: [DVec3; 2],
     /// The distances between pixels along x and y.
     pub(super) spacing: [f64; 2],
-    /// The distance between frames, if the frame itself states it.
+    /// The distance between slices, if the frame states it.
+    pub(super) between: Option<f64>,
+    /// This distance, or else the thickness of a slice, if the frame states it.
     pub(super) thickness: Option<f64>,
     /// Slope and intercept.
     pub(super) rescale: [f64; 2],
@@ -110,6 +112,7 @@ pub(super) fn read(data: &Dataset, count: usize) -> Result<(Vec<Frame>, Option<A
             position: DVec3::from_array(position) + along * normal,
             directions: [row, column],
             spacing: [x, y],
+            between,
             thickness,
             rescale: [slope * scaling, intercept * scaling],
             rescale_type: last_type.clone(),

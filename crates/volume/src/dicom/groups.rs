@@ -11,6 +11,7 @@ use super::super::access::Access;
 use super::super::error::volume::invalid;
 use super::frames::Frame;
 use super::image::{Belonging, Image, Opened};
+use super::segments::Segments;
 
 /// Directions with a smaller difference, and pixel sizes with a smaller relative difference, count as equal.
 const SAME: f64 = 1e-4;
@@ -38,12 +39,19 @@ pub(super) struct Chosen {
     pub(super) listed: Vec<String>,
 }
 
+impl Chosen {
+    /// The segments, if the slices are those of a segmentation.
+    pub(super) fn segments(&self) -> Option<&Segments> {
+        self.slices.first().and_then(|slice| self.images[slice.image].segments.as_ref())
+    }
+}
+
 /// Frames of one series that share size, spacing and orientation, and the files of this series that are refused.
 #[derive(Default)]
 struct Group {
     slices: Vec<Slice>,
     refused: Vec<usize>,
-    /// How many slices the volume should have.
+    /// How many slices the volume should have; 0 for a segmentation, which goes behind the scan beside it.
     weight: usize,
     series: String,
     described: String,
@@ -57,7 +65,7 @@ pub(super) fn choose(path: &Path, opened: Vec<Opened>, access: &Access) -> Resul
     let (mut images, mut refused) = (Vec::new(), Vec::new());
     for one in opened {
         match one {
-            Opened::Image(image) => images.push(image),
+            Opened::Image(image) => images.push(*image),
             Opened::Refused { belonging, is_placed, error } => refused.push((belonging, is_placed, error)),
         }
     }
@@ -125,7 +133,10 @@ fn groups_of(path: &Path, images: &[Image], refused: &[(Belonging, bool, VolumeE
         let (kinds, others) = kinds_of(frames, |&(first, _, kind): &(usize, usize, &Frame), &(image, _, frame)| {
             let near = |a: f64, b: f64| (a - b).abs() <= SAME * a.max(b);
             let [a, b] = [&images[first].pixels, &images[image].pixels];
-            a.samples == b.samples
+            // Segments of several files may not share a grid.
+            let is_segmentation = |image: usize| images[image].segments.is_some();
+            (first == image || !is_segmentation(first) && !is_segmentation(image))
+                && a.samples == b.samples
                 && [a.columns, a.rows] == [b.columns, b.rows]
                 && near(kind.spacing[0], frame.spacing[0])
                 && near(kind.spacing[1], frame.spacing[1])
@@ -153,7 +164,8 @@ fn groups_of(path: &Path, images: &[Image], refused: &[(Belonging, bool, VolumeE
                 rescale: of.rescale,
             };
             let slices: Vec<Slice> = members.into_iter().map(slice).collect();
-            Group { weight: slices.len(), slices, refused: Vec::new(), series: uid.to_owned(), described }
+            let weight = if images[first].segments.is_some() { 0 } else { slices.len() };
+            Group { weight, slices, refused: Vec::new(), series: uid.to_owned(), described }
         };
         let mut of_series: Vec<Group> = kinds.into_iter().map(of_kind).collect();
         of_series.sort_by_key(|group| Reverse(group.weight));

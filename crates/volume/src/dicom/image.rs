@@ -13,6 +13,7 @@ use super::elements::{Elements, PixelData};
 use super::frames::{self, Assumed, Frame};
 use super::marks::{self, Marked};
 use super::palette::{self, Palette};
+use super::segments::Segments;
 use super::table::Table;
 
 /// The class of files that contain no image but a list of other files.
@@ -32,7 +33,7 @@ pub(super) struct Belonging {
 
 /// A file with pixels.
 pub(super) enum Opened {
-    Image(Image),
+    Image(Box<Image>),
     /// One that cannot be part of a volume.
     Refused {
         belonging: Belonging,
@@ -58,6 +59,8 @@ pub(super) struct Image {
     table: Option<Table>,
     /// The colours of values, if these are indices.
     pub(super) palette: Option<Palette>,
+    /// The segments, if the image is a segmentation.
+    pub(super) segments: Option<Segments>,
     /// The unit of the rescaled values.
     pub(super) value_unit: Option<String>,
     pub(super) frames: Vec<Frame>,
@@ -83,6 +86,8 @@ pub(super) struct Pixels {
     pub(super) samples: u16,
     /// Whether all red samples of a frame are stored first, then all green ones, then all blue ones.
     is_planar: bool,
+    /// Whether samples are bits, the lowest bit of a byte first, without gaps between rows and frames (PS3.5 8.1.1).
+    is_packed: bool,
     /// The number of significant low bits in a sample.
     bits: u16,
     big_endian: bool,
@@ -112,7 +117,7 @@ impl Image {
         };
         let (refused, is_placed) = (belonging(data), frames::are_placed(data));
         match Self::of(path, elements, belonging, access) {
-            Ok(image) => Ok(image.map(Opened::Image)),
+            Ok(image) => Ok(image.map(|image| Opened::Image(Box::new(image)))),
             Err(error) => Ok(Some(Opened::Refused { belonging: refused, is_placed, error })),
         }
     }
@@ -142,6 +147,7 @@ impl Image {
         pixels.check(&data, tag, &pixel_data, count, codec)?;
         let (frames, assumed) = frames::read(&data, count)?;
         let is_signed = matches!(pixels.kind, SampleType::I8 | SampleType::I16 | SampleType::I32);
+        let segments = Segments::read(&data, count)?;
         let value_unit = value_unit(&data);
         let has_palette = data.text(tags::PHOTOMETRIC).as_deref() == Some(INDICES);
         let palette = has_palette.then(|| palette::read(&data, is_signed)).transpose()?;
@@ -164,6 +170,7 @@ impl Image {
             pixels,
             table: table.filter(|_| pixels.samples == 1),
             palette,
+            segments,
             value_unit,
             codec,
             data: pixel_data,
@@ -179,14 +186,15 @@ impl Image {
     /// A frame's samples, in the machine's byte order.
     pub(super) fn frame(&self, index: usize, access: &Access) -> Result<Vec<u8>, VolumeError> {
         let Pixels { columns, rows, kind, .. } = self.pixels;
-        let size = self.pixels.bytes();
+        let [first, size] = self.pixels.stretch(index);
         let mut bytes = match (&self.data, &self.inflated) {
             (PixelData::Native { .. }, Some(all)) => {
-                let of_frame = all.chunks(size as usize).nth(index).unwrap_or_default();
+                let of_frame = all.get(first as usize..).unwrap_or_default();
+                let of_frame = &of_frame[..of_frame.len().min(size as usize)];
                 self.check_read(of_frame.len(), size)?;
                 of_frame.to_vec()
             }
-            (&PixelData::Native { at, .. }, None) => self.read(&[[at + index as u64 * size, size]], access)?,
+            (&PixelData::Native { at, .. }, None) => self.read(&[[at + first, size]], access)?,
             (PixelData::Fragments(fragments), _) => {
                 // A single frame may be split into several fragments.
                 let of_frame = if self.frames.len() == 1 { fragments } else { &fragments[index..=index] };
@@ -196,6 +204,9 @@ impl Image {
                 })?
             }
         };
+        if self.pixels.is_packed {
+            bytes = self.pixels.unpacked(&bytes, index);
+        }
         if self.codec == Codec::None && self.pixels.big_endian != cfg!(target_endian = "big") {
             bytes.chunks_exact_mut(kind.bytes() as usize).for_each(<[u8]>::reverse);
         }
@@ -271,7 +282,9 @@ impl Pixels {
             return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "8 bits for YBR_FULL"));
         }
         let is_signed = data.unsigned(tags::PIXEL_REPRESENTATION)?.unwrap_or(0) == 1;
+        let is_packed = tag == tags::PIXEL_DATA && allocated == 1 && codec == Codec::None;
         let kind = match (tag, allocated, is_signed) {
+            (_, 1, false) if is_packed => SampleType::U8,
             (tags::FLOAT_PIXEL_DATA, 32, _) => SampleType::F32,
             (tags::DOUBLE_PIXEL_DATA, 64, _) => SampleType::F64,
             (tags::PIXEL_DATA, 8, false) => SampleType::U8,
@@ -280,11 +293,25 @@ impl Pixels {
             (tags::PIXEL_DATA, 16, true) => SampleType::I16,
             (tags::PIXEL_DATA, 32, false) => SampleType::U32,
             (tags::PIXEL_DATA, 32, true) => SampleType::I32,
-            _ => return Err(data.invalid(tags::BITS_ALLOCATED, allocated, "8, 16 or 32, of floats 32 or 64")),
+            _ => {
+                let allowed = "1 (uncompressed), 8, 16 or 32, of floats 32 or 64";
+                return Err(data.invalid(tags::BITS_ALLOCATED, allocated, allowed));
+            }
+        };
+        let pixels = Self {
+            columns,
+            rows,
+            kind,
+            samples,
+            is_planar,
+            is_packed,
+            bits: allocated,
+            big_endian,
+            is_inverted,
+            is_ybr,
         };
         if tag != tags::PIXEL_DATA {
-            let bits = allocated;
-            return Ok(Self { columns, rows, kind, samples, is_planar, bits, big_endian, is_inverted, is_ybr });
+            return Ok(pixels);
         }
         let bits = data.unsigned(tags::BITS_STORED)?.unwrap_or(allocated);
         if !(1..=allocated).contains(&bits) {
@@ -294,12 +321,29 @@ impl Pixels {
         if high != bits - 1 {
             return Err(data.invalid(tags::HIGH_BIT, high, format!("{}, the highest of {bits}", bits - 1)));
         }
-        Ok(Self { columns, rows, kind, samples, is_planar, bits, big_endian, is_inverted, is_ybr })
+        Ok(Self { bits, ..pixels })
     }
 
-    /// The size of a frame in bytes.
+    /// The size of a frame in bytes, each bit in a byte of its own.
     fn bytes(&self) -> u64 {
         u64::from(self.columns) * u64::from(self.rows) * self.bytes_per_pixel() as u64
+    }
+
+    /// The first byte of an uncompressed frame among those of all, and the number of bytes that hold it.
+    fn stretch(&self, index: usize) -> [u64; 2] {
+        let (index, size) = (index as u64, self.bytes());
+        if !self.is_packed {
+            return [index * size, size];
+        }
+        let [first, end] = [index * size / 8, ((index + 1) * size).div_ceil(8)];
+        [first, end - first]
+    }
+
+    /// The samples of a frame of bits, each in a byte, given the bytes that hold it.
+    fn unpacked(&self, bytes: &[u8], index: usize) -> Vec<u8> {
+        let size = self.bytes() as usize;
+        let first = index * size % 8;
+        (first..first + size).map(|bit| bytes[bit / 8] >> (bit % 8) & 1).collect()
     }
 
     fn bytes_per_pixel(&self) -> usize {
@@ -341,13 +385,15 @@ impl Pixels {
     ) -> Result<(), VolumeError> {
         match pixel_data {
             PixelData::Native { bytes, .. } if codec == Codec::None => {
-                let expected = self.bytes().saturating_mul(frames as u64);
+                let samples = self.bytes().saturating_mul(frames as u64);
+                let expected = if self.is_packed { samples.div_ceil(8) } else { samples };
                 // The size is padded to an even number.
                 if *bytes == expected || *bytes == expected.saturating_add(expected % 2) {
                     return Ok(());
                 }
                 let Self { columns, rows, kind, .. } = self;
                 let allowed = format!("{expected} bytes ({frames} frames of {columns} × {rows} {kind})");
+                let allowed = if self.is_packed { allowed.replace("uint8", "bits") } else { allowed };
                 Err(data.invalid(tag, format!("{bytes} bytes"), allowed))
             }
             PixelData::Fragments(fragments) if codec != Codec::None => {

@@ -16,14 +16,14 @@ mod groups;
 mod image;
 mod marks;
 mod palette;
+mod segmentation;
+mod segments;
 mod series;
 mod stacks;
 mod table;
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-
-use glam::DMat3;
 
 use self::frames::Assumed;
 use self::groups::{Chosen, Slice};
@@ -35,37 +35,35 @@ use super::access::Access;
 use super::error::volume::invalid;
 use super::grid::{SIZES, dims_of};
 use super::loaded::{Legend, Loaded};
-use super::orientation::{Orientation, RAS_FROM_LPS};
+use super::orientation::Orientation;
 use super::samples::Samples;
 use super::series::apart;
-use super::voxel::{Many, Voxel};
 use crate::parallel;
 use crate::parallel::prelude::*;
 
 /// Reads the frames of one file.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let Some(opened) = Image::open(path, access)? else {
         return Err(invalid(path, "PixelData", "no such element", "an image"));
     };
     let chosen = groups::choose(path, vec![opened], access)?;
-    if chosen.slices.len() == 1 {
+    if chosen.slices.len() == 1 && chosen.segments().is_none() {
         log::warn!("{}: one slice; a folder with all slices of a series is read as one volume", path.display());
     }
     assemble(path, chosen, access)
 }
 
 /// Reads the slices of a series, each in a file of its own.
-pub(super) fn read_folder<T: Voxel>(
-    folder: &Path,
-    files: &[PathBuf],
-    access: &Access,
-) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read_folder(folder: &Path, files: &[PathBuf], access: &Access) -> Result<Loaded, VolumeError> {
     let opened: Result<Vec<_>, _> = files.par_iter().map(|path| Image::open(path, access)).collect();
     let opened: Vec<Opened> = opened?.into_iter().flatten().collect();
     assemble(folder, groups::choose(folder, opened, access)?, access)
 }
 
-fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Loaded<T>, VolumeError> {
+fn assemble(path: &Path, chosen: Chosen, access: &Access) -> Result<Loaded, VolumeError> {
+    if chosen.segments().is_some() {
+        return segmentation::assemble(path, chosen, access);
+    }
     let Chosen { images, slices, listed } = chosen;
     let Series { stacks, lattice, even } = Series::of(path, &images, slices, access)?;
     let count = stacks.stacks[0].len();
@@ -91,9 +89,9 @@ fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Lo
     let all_read = || read.iter().copied().flatten();
     let rescale = all_read().find_map(rescale_of);
     let all = Samples { kind, dims, big_endian: false, rescale, z_fastest: false };
-    let mut values = T::Many::default();
+    let mut values = access.wanted().none();
     for slices in &read {
-        all.reserve::<T>(path, access)?;
+        all.reserve(path, access)?;
         // One slice per thread at a time, because codecs are slow.
         for slices in slices.chunks(parallel::current_num_threads()) {
             let frames: Vec<_> =
@@ -103,22 +101,22 @@ fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Lo
                 let big_endian = cfg!(target_endian = "big");
                 let samples =
                     Samples { kind: image.kind(), dims, big_endian, rescale: rescale_of(slice), z_fastest: false };
-                access.note_rounding(samples.append::<T>(&image.path, &frame?, &mut values)?);
+                access.note_rounding(samples.append(&image.path, &frame?, &mut values)?);
             }
         }
     }
     values.shrink_to_fit();
-    let values = apart::<T>(values, components.into()).map_err(all.too_many(path))?;
+    let values = apart(values, components.into()).map_err(all.too_many(path))?;
     let is_indexed = first.palette.is_some();
     let (dims, values) = match even {
         None => (dims, values),
         Some(even) => {
             let even = if is_indexed { even.nearest() } else { even };
             let resampled = dims_of([sides[0], rows, even.places.len() as u64]).ok_or_else(wrong_sizes)?;
-            let bytes = resampled.element_product() as usize * size_of::<T>() * read.len();
-            access.reserve(path, groups::POSITION, format!("{} slices", even.places.len()), bytes as u64)?;
+            let bytes = u64::from(resampled.element_product()) * access.wanted().alone() * read.len() as u64;
+            access.reserve(path, groups::POSITION, format!("{} slices", even.places.len()), bytes)?;
             let inner = columns as usize * rows as usize;
-            let values = even.resampled::<T>(&values, inner, count).map_err(all.too_many(path))?;
+            let values = even.resampled(&values, inner, count).map_err(all.too_many(path))?;
             (resampled, values)
         }
     };
@@ -131,8 +129,7 @@ fn assemble<T: Voxel>(path: &Path, chosen: Chosen, access: &Access) -> Result<Lo
         let (path, elements, z) = (path.display(), assumed.names(), lattice.spacing.z);
         log::warn!("{path}: no {elements}: frames are taken to be stacked {z} apart");
     }
-    let origin = RAS_FROM_LPS * origin;
-    let orientation = Orientation { axes: DMat3::from_diagonal(RAS_FROM_LPS) * lattice.axes, origin };
+    let orientation = Orientation::of_lps(lattice.axes, origin);
     let orientation = Some(orientation).filter(|_| matches!(first.assumed, None | Some(Assumed::Steps)));
     let unit = Some("mm".to_owned()).filter(|_| first.assumed != Some(Assumed::Grid));
     let types: BTreeSet<&str> = all_read()

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use super::super::VolumeError;
 use super::super::access::Access;
@@ -10,6 +10,7 @@ use super::super::error::volume::invalid;
 use super::super::orientation::{lengths_and_directions, orthogonal};
 use super::super::shear::{self, Lattice};
 use super::super::uneven::Even;
+use super::frames::Frame;
 use super::groups::{POSITION, Slice};
 use super::image::Image;
 use super::stacks::{Stacks, name_of};
@@ -17,11 +18,11 @@ use super::stacks::{Stacks, name_of};
 /// The error of positions, as a fraction of a step, that gives no warning.
 const EVEN: f64 = 0.01;
 /// The error of positions, as a fraction of a step, up to which slices are taken to be evenly spaced.
-const NEARLY_EVEN: f64 = 0.1;
+pub(super) const NEARLY_EVEN: f64 = 0.1;
 /// The maximum sideways distance of a slice from the line, as a fraction of a pixel.
 const STRAIGHT: f64 = 0.5;
 /// The distance, as a fraction of a pixel, that counts as none: sideways, and between slices at one place.
-const EXACT: f64 = 0.01;
+pub(super) const EXACT: f64 = 0.01;
 
 /// All frames of a volume, in order along its z axis.
 pub(super) struct Series {
@@ -41,9 +42,7 @@ impl Series {
         access: &Access,
     ) -> Result<Self, VolumeError> {
         let first = &images[slices[0].image].frames[slices[0].frame];
-        let [row, column] = first.directions;
-        let (_, axes) = lengths_and_directions([row, column, row.cross(column)])
-            .map_err(|found| invalid(path, "ImageOrientationPatient", found, orthogonal()))?;
+        let axes = axes_of(path, first)?;
         let [x, y] = first.spacing;
         let pixel = x.min(y);
         let along = |slice: &Slice| slice.position.dot(axes.z_axis);
@@ -83,37 +82,8 @@ impl Series {
             }
         };
         let spacing = DVec3::new(x, y, z);
-        let offset = |slice: &Slice| slice.position - slices[0].position;
-        let sideways = |slice: &Slice| offset(slice) - offset(slice).dot(axes.z_axis) * axes.z_axis;
         let number = |i: usize| if even.is_some() { (positions[i] - positions[0]) / z } else { i as f64 };
-        // The slice that is farthest from the line through the first slice along the normal plus `drift` per step.
-        let farthest = |drift: DVec3| {
-            let off = |(i, slice)| ((sideways(slice) - number(i) * drift).length(), slice);
-            slices.iter().enumerate().map(off).fold((0.0, &slices[0]), |a, b| if b.0 > a.0 { b } else { a })
-        };
-        let (mut off, mut slice) = farthest(DVec3::ZERO);
-        let mut lattice = Lattice::straight(spacing, axes);
-        if off > STRAIGHT * pixel {
-            // If the slices are sheared, the line runs through the first and the last one.
-            let last = slices.len() - 1;
-            let drift = sideways(&slices[last]) / number(last);
-            (off, slice) = farthest(drift);
-            if off > STRAIGHT * pixel {
-                let found = format!("{}, {off:.4} mm off the line through the first and the last slice", name(slice));
-                return Err(invalid(
-                    path,
-                    POSITION,
-                    found,
-                    format!("slices on one line, to half a pixel of {pixel} mm"),
-                ));
-            }
-            let steps = [x * axes.x_axis, y * axes.y_axis, z * axes.z_axis + drift];
-            lattice = Lattice::of(steps).map_err(|found| invalid(path, POSITION, found, shear::allowed()))?;
-        }
-        if off > EXACT * pixel {
-            let (path, name) = (path.display(), name(slice));
-            log::warn!("{path}: slices are not quite on one line: {name} is {off:.4} mm off, the largest error");
-        }
+        let lattice = lattice_of(path, images, slices, (spacing, axes), number)?;
         for (slice, other) in stacks.stacks[1..].iter().flat_map(|stack| slices.iter().zip(stack)) {
             let off = slice.position.distance(other.position);
             if off > STRAIGHT * pixel {
@@ -123,6 +93,53 @@ impl Series {
         }
         Ok(Self { stacks, lattice, even })
     }
+}
+
+/// The directions of a frame's rows, of its columns, and of its normal.
+pub(super) fn axes_of(path: &Path, frame: &Frame) -> Result<DMat3, VolumeError> {
+    let [row, column] = frame.directions;
+    let axes = lengths_and_directions([row, column, row.cross(column)]);
+    let (_, axes) = axes.map_err(|found| invalid(path, "ImageOrientationPatient", found, orthogonal()))?;
+    Ok(axes)
+}
+
+/// The lattice of slices in the order of their places, each a `number` of steps behind the first.
+pub(super) fn lattice_of(
+    path: &Path,
+    images: &[Image],
+    slices: &[Slice],
+    (spacing, axes): (DVec3, DMat3),
+    number: impl Fn(usize) -> f64,
+) -> Result<Lattice, VolumeError> {
+    let name = |slice: &Slice| name_of(images, slice);
+    let pixel = spacing.x.min(spacing.y);
+    let offset = |slice: &Slice| slice.position - slices[0].position;
+    let sideways = |slice: &Slice| offset(slice) - offset(slice).dot(axes.z_axis) * axes.z_axis;
+    // The slice that is farthest from the line through the first slice along the normal plus `drift` per step.
+    let farthest = |drift: DVec3| {
+        let off = |(i, slice)| ((sideways(slice) - number(i) * drift).length(), slice);
+        slices.iter().enumerate().map(off).fold((0.0, &slices[0]), |a, b| if b.0 > a.0 { b } else { a })
+    };
+    let (mut off, mut slice) = farthest(DVec3::ZERO);
+    let mut lattice = Lattice::straight(spacing, axes);
+    if off > STRAIGHT * pixel {
+        // If the slices are sheared, the line runs through the first and the last one.
+        let last = slices.len() - 1;
+        let steps = number(last);
+        let drift = if steps > 0.0 { sideways(&slices[last]) / steps } else { DVec3::ZERO };
+        (off, slice) = farthest(drift);
+        if off > STRAIGHT * pixel {
+            let found = format!("{}, {off:.4} mm off the line through the first and the last slice", name(slice));
+            return Err(invalid(path, POSITION, found, format!("slices on one line, to half a pixel of {pixel} mm")));
+        }
+        let [x, y, z] = [0, 1, 2].map(|axis| spacing[axis] * axes.col(axis));
+        lattice = Lattice::of([x, y, z + drift]).map_err(|found| invalid(path, POSITION, found, shear::allowed()))?;
+    }
+    if off > EXACT * pixel {
+        let (path, name) = (path.display(), name(slice));
+        log::warn!("{path}: slices are not quite on one line: {name} is {off:.4} mm off, the largest error");
+    }
+    Ok(lattice)
 }
 
 /// The steps between ascending positions.

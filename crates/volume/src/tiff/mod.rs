@@ -31,13 +31,13 @@ use super::loaded::{Legend, Loaded};
 use super::samples::Samples;
 use super::series::{Series, apart};
 use super::stream::Stream;
-use super::voxel::{Many, Voxel};
+use super::voxels::{Voxels, Wanted};
 
 /// Reads the pages of one file.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let mut pages = Pages::open(path, access)?;
     let calibration = Calibration::of(&mut pages)?;
-    let mut slices = Slices::<T>::new(path, &pages, &calibration)?;
+    let mut slices = Slices::new(path, &pages, &calibration)?;
     let stack = calibration.stack.map(|stack| stack.of_pixels(pages.page.samples));
     let stack = stack.as_ref();
     let (series, selection) = (stack.map(Stack::series).unwrap_or_default(), access.selection());
@@ -46,7 +46,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     }
     series.check(path, selection)?;
     let channels = series.channels(selection);
-    slices.channels.resize_with(channels.len(), OfChannel::default);
+    slices.channels.resize_with(channels.len(), || OfChannel::none(access.wanted()));
     // The channel of a page among those that are read, and its slice.
     let wanted = |number: u32| {
         let alone = Place { slice: number, ..Place::default() };
@@ -68,8 +68,8 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
         while count < all {
             match wanted(count) {
                 Some((channel, slice)) => {
-                    samples.reserve::<T>(path, access)?;
-                    let page = stream.read_samples::<T>(&samples)?;
+                    samples.reserve(path, access)?;
+                    let page = stream.read_samples(&samples)?;
                     let appended = slices.channels[channel].values.append_from(&page, 0..page.count());
                     appended.map_err(samples.too_many(path))?;
                     slices.channels[channel].slices.push(slice);
@@ -113,7 +113,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
 }
 
 /// Reads a folder of files with one page each, in the given order.
-pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read_folder(path: &Path, files: &[PathBuf], access: &Access) -> Result<Loaded, VolumeError> {
     let mut kinds: Vec<(Page, Vec<&PathBuf>)> = Vec::new();
     for file in files {
         let pages = Pages::open(file, access)?;
@@ -133,9 +133,9 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Acc
     };
     let mut first = Pages::open(slices_of_one_kind[0], access)?;
     let calibration = Calibration::of(&mut first)?;
-    let mut slices = Slices::<T>::new(path, &first, &calibration)?;
+    let mut slices = Slices::new(path, &first, &calibration)?;
     run::check(path, files)?;
-    slices.channels.push(OfChannel::default());
+    slices.channels.push(OfChannel::none(access.wanted()));
     for (slice, file) in (0..).zip(slices_of_one_kind) {
         slices.add(&mut Pages::open(file, access)?, (0, slice), access)?;
     }
@@ -144,21 +144,20 @@ pub(super) fn read_folder<T: Voxel>(path: &Path, files: &[PathBuf], access: &Acc
 }
 
 /// The slices of a channel in the order of the file.
-struct OfChannel<T: Voxel> {
-    values: T::Many,
+struct OfChannel {
+    values: Voxels,
     /// The number of each slice.
     slices: Vec<u32>,
 }
 
-impl<T: Voxel> Default for OfChannel<T> {
-    fn default() -> Self {
-        Self { values: T::Many::default(), slices: Vec::new() }
+impl OfChannel {
+    /// No slices of what is wanted.
+    fn none(wanted: Wanted) -> Self {
+        Self { values: wanted.none(), slices: Vec::new() }
     }
-}
 
-impl<T: Voxel> OfChannel<T> {
     /// The values with the slices in order; `None` if a slice is missing or comes twice.
-    fn in_order(self) -> Option<T::Many> {
+    fn in_order(self) -> Option<Voxels> {
         let Self { mut values, mut slices } = self;
         let mut sorted = slices.clone();
         sorted.sort_unstable();
@@ -179,16 +178,16 @@ impl<T: Voxel> OfChannel<T> {
 }
 
 /// Slices of one size and type, appended to the values of their channel.
-struct Slices<'a, T: Voxel> {
+struct Slices<'a> {
     path: &'a Path,
     page: Page,
     /// The first page's palette, unless another page has a different one.
     palette: Option<Vec<[u8; 3]>>,
     rescale: Option<[f64; 2]>,
-    channels: Vec<OfChannel<T>>,
+    channels: Vec<OfChannel>,
 }
 
-impl<'a, T: Voxel> Slices<'a, T> {
+impl<'a> Slices<'a> {
     fn new(path: &'a Path, pages: &Pages, calibration: &Calibration) -> Result<Self, VolumeError> {
         let (page, palette) = (pages.page, pages.palette.clone());
         Ok(Self { path, page, palette, rescale: calibration.rescale, channels: Vec::new() })
@@ -223,32 +222,32 @@ impl<'a, T: Voxel> Slices<'a, T> {
         if count == 0 && channel == 0 {
             access.reserve(&pages.path, &pages.name(), self.page, self.page.bytes())?;
         }
-        self.samples(1)?.reserve::<T>(&pages.path, access)?;
+        self.samples(1)?.reserve(&pages.path, access)?;
         let bytes = pages.bytes()?;
         self.channels[channel].slices.push(slice);
-        access.note_rounding(samples.append::<T>(&pages.path, &bytes, &mut self.channels[channel].values)?);
+        access.note_rounding(samples.append(&pages.path, &bytes, &mut self.channels[channel].values)?);
         Ok(())
     }
 
-    fn finish(mut self, calibration: &Calibration) -> Result<Loaded<T>, VolumeError> {
+    fn finish(mut self, calibration: &Calibration) -> Result<Loaded, VolumeError> {
         let samples = self.samples(self.count(0))?;
         let Samples { dims, kind, .. } = samples;
         let components = self.page.samples;
         let dims = dims.with_x(dims.x / components);
-        let mut all = T::Many::default();
+        let mut all = None;
         let too_many = samples.too_many(self.path);
         for channel in std::mem::take(&mut self.channels) {
             let allowed = "every slice of every channel and time once, as the description says";
             let refused = || invalid(self.path, "TiffData", "a slice that is missing or comes twice", allowed);
             let values = channel.in_order().ok_or_else(refused)?;
-            if all.count() == 0 {
-                all = values;
-            } else {
-                all.append_from(&values, 0..values.count()).map_err(&too_many)?;
+            match &mut all {
+                None => all = Some(values),
+                Some(all) => all.append_from(&values, 0..values.count()).map_err(&too_many)?,
             }
         }
+        let mut all: Voxels = all.unwrap_or_else(|| Wanted::Values.none());
         all.shrink_to_fit();
-        let all = apart::<T>(all, components as usize).map_err(&too_many)?;
+        let all = apart(all, components as usize).map_err(&too_many)?;
         let series = if components > 1 { Series::of_colors(components, 1) } else { Series::default() };
         let spacing = calibration.spacing.map(|[x, y]| {
             let z = calibration.between_slices.unwrap_or_else(|| {
@@ -258,7 +257,7 @@ impl<'a, T: Voxel> Slices<'a, T> {
             });
             DVec3::new(x, y, z)
         });
-        let palette = self.palette.map(|colors| values_of(&colors, self.rescale)).filter(|palette| !palette.is_empty());
+        let palette = self.palette.and_then(|colors| values_of(&colors, self.rescale));
         let unit = calibration.unit.clone();
         let (channel_names, displays) = (calibration.channel_names.clone(), calibration.displays.clone());
         let legends = vec![Legend::of_palette(palette)];
@@ -267,16 +266,13 @@ impl<'a, T: Voxel> Slices<'a, T> {
 }
 
 /// The colours of the values that a palette's indices become, in ascending order.
-fn values_of(colors: &[[u8; 3]], rescale: Option<[f64; 2]>) -> Vec<(f64, DVec3)> {
+fn values_of(colors: &[[u8; 3]], rescale: Option<[f64; 2]>) -> Option<Vec<(f64, DVec3)>> {
     let [slope, intercept] = rescale.unwrap_or([1.0, 0.0]);
     let rgb = |color: [u8; 3]| DVec3::from(color.map(|channel| f64::from(channel) / 255.0));
     // Volumes store values as f32.
     let value = |index: usize| f64::from((index as f64 * slope + intercept) as f32);
-    let mut points: Vec<_> = colors.iter().enumerate().map(|(index, &color)| (value(index), rgb(color))).collect();
-    points.retain(|(value, _)| value.is_finite());
-    points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    points.dedup_by_key(|point| point.0);
-    points
+    let points = colors.iter().enumerate().map(|(index, &color)| (value(index), rgb(color)));
+    Legend::ascending(points.filter(|(value, _)| value.is_finite()).collect())
 }
 
 #[cfg(test)]
@@ -286,8 +282,10 @@ mod tests {
     #[test]
     fn slices_come_into_their_order() {
         let of = |slices: &[u32]| {
-            let values = slices.iter().flat_map(|&slice| [10 * slice as u16, 10 * slice as u16 + 1]).collect();
-            OfChannel::<u16> { values, slices: slices.to_vec() }.in_order()
+            let values: Vec<u64> =
+                slices.iter().flat_map(|&slice| [10, 11].map(|of| 10 * u64::from(slice) + of - 10)).collect();
+            let values = OfChannel { values: values.into(), slices: slices.to_vec() }.in_order();
+            values.map(|values| values.ids())
         };
         for slices in [&[0, 1, 2, 3, 4][..], &[4, 3, 2, 1, 0], &[1, 2, 3, 4, 0], &[2, 0, 1, 4, 3]] {
             assert_eq!(of(slices), Some(vec![0, 1, 10, 11, 20, 21, 30, 31, 40, 41]), "{slices:?}");

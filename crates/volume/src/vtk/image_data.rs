@@ -23,7 +23,6 @@ use super::super::series::{MAX_CHANNELS, Series, SeriesOrder};
 use super::super::stream::Stream;
 use super::super::text::{number, three};
 use super::super::unit;
-use super::super::voxel::Voxel;
 use super::super::xml;
 use super::blocks::{Base64, Blocks, Compressor, HeaderType};
 use super::choice::warn_of_choice;
@@ -46,7 +45,7 @@ const TYPES: [(&str, SampleType); 10] = [
 ];
 
 /// Reads the array of one file.
-pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(in super::super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let header = Header::read(path, access)?;
     let left_handed = !header.is_rectilinear && header.is_left_handed()?;
     let array = header.choose()?;
@@ -59,7 +58,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         return Err(header.image.invalid("NumberOfComponents", found, "at most 4294967295 numbers"));
     };
     let stream = header.open(path, access, array, &Samples { dims: side, ..samples })?;
-    let values = stream.series::<T>(&samples, &series, false)?;
+    let values = stream.series(&samples, &series, false)?;
     let loaded = Loaded { series, ..Loaded::new(dims, samples.kind, values) };
     if header.is_rectilinear {
         let coordinates = header.coordinates(path, access, array.of_cells)?;

@@ -18,7 +18,6 @@ use super::super::source::{MAX_HEADER, Source};
 use super::super::stream::Stream;
 use super::super::text::{number, shown, three};
 use super::super::unit;
-use super::super::voxel::Voxel;
 use super::rectilinear::{Coordinates, resampled};
 
 /// The keywords of coordinates.
@@ -43,7 +42,7 @@ const KEYWORDS: &[&str] = &[
 ];
 
 /// Reads a file's first array with one component.
-pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(in super::super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
     let mut header = Header::open(path, access)?;
     let array = header.find_array()?;
     let (dims, kind, spacing) = (header.dims(&array)?, array.kind, header.spacing()?);
@@ -57,7 +56,7 @@ pub(in super::super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<L
         check_rest(path, access, file.left()?, &samples)?;
         Stream::raw(file)?
     };
-    let loaded = Loaded::new(dims, kind, stream.samples::<T>(&samples, !is_text)?);
+    let loaded = Loaded::new(dims, kind, stream.samples(&samples, !is_text)?);
     match coordinates {
         Some(coordinates) => resampled(path, coordinates, loaded, access),
         None => Ok(Loaded { spacing, ..loaded }),

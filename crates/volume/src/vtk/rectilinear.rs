@@ -10,7 +10,6 @@ use super::super::error::volume::invalid;
 use super::super::grid::{SIZES, dims_of};
 use super::super::loaded::Loaded;
 use super::super::uneven::{Even, MAX_GROWTH, SAME_PLACE};
-use super::super::voxel::{Many, Voxel};
 
 /// The coordinates of the points along an axis, and their name in errors.
 pub(super) struct Coordinates {
@@ -42,12 +41,12 @@ impl Coordinates {
 }
 
 /// A volume whose samples lie at coordinates, resampled along axes on which these are not even: linearly, labels by the nearest sample.
-pub(super) fn resampled<T: Voxel>(
+pub(super) fn resampled(
     path: &Path,
     coordinates: [Coordinates; 3],
-    mut loaded: Loaded<T>,
+    mut loaded: Loaded,
     access: &Access,
-) -> Result<Loaded<T>, VolumeError> {
+) -> Result<Loaded, VolumeError> {
     let mut steps = [None; 3];
     for (axis, of_axis) in coordinates.iter().enumerate() {
         let Coordinates { name, places } = of_axis;
@@ -65,9 +64,9 @@ pub(super) fn resampled<T: Voxel>(
         sizes[axis] = to as u32;
         let dims = dims_of(sizes).ok_or_else(|| invalid(path, name, format!("{sizes:?} samples"), SIZES))?;
         let channels = loaded.values.count() as u64 / u64::from(loaded.dims.element_product());
-        let bytes = channels * u64::from(dims.element_product()) * T::bytes(loaded.kind, true);
+        let bytes = channels * u64::from(dims.element_product()) * access.wanted().bytes(loaded.kind, true);
         access.reserve(path, name, format!("{dims} voxels"), bytes)?;
-        let values = even.resampled::<T>(&loaded.values, inner as usize, from);
+        let values = even.resampled(&loaded.values, inner as usize, from);
         loaded.values = values.map_err(|error| invalid(path, name, format!("{dims} voxels: {error}"), "fewer"))?;
         loaded.dims = UVec3::from_array(sizes);
         let step = |pair: &[f64]| pair[1] - pair[0];

@@ -1,12 +1,11 @@
 //! How an image's channels are shown, and what labels mean.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 
 use super::super::loaded::Legend;
 
 use super::super::display::ChannelDisplay;
+use super::super::sample_type::Sample;
 use super::json::Json;
 
 /// The names of channels and how they are shown, as `omero` states them.
@@ -43,7 +42,7 @@ fn color(text: &str) -> Option<DVec3> {
 pub(super) fn labels(image_label: &Json) -> Legend {
     let value = |label: &Json| {
         let number = label.get("label-value").number()?;
-        (number.fract() == 0.0 && (0.0..=f64::from(u16::MAX)).contains(&number)).then_some(number as u16)
+        number.to_id()
     };
     let name = |label: &Json| {
         let name = ["name", "class", "label"].iter().find_map(|key| label.get(key).text())?;
@@ -52,12 +51,10 @@ pub(super) fn labels(image_label: &Json) -> Legend {
     let color = |label: &Json| {
         let numbers: Vec<f64> = label.get("rgba").members().iter().filter_map(Json::number).collect();
         let &[red, green, blue, ..] = numbers.as_slice() else { return None };
-        Some((value(label)?, DVec3::new(red, green, blue).clamp(DVec3::ZERO, DVec3::splat(255.0)) / 255.0))
+        Some((value(label)? as f64, DVec3::new(red, green, blue).clamp(DVec3::ZERO, DVec3::splat(255.0)) / 255.0))
     };
     let names = image_label.get("properties").members().iter().filter_map(name).collect();
-    let colors: BTreeMap<u16, DVec3> = image_label.get("colors").members().iter().filter_map(color).collect();
-    let palette: Vec<_> = colors.into_iter().map(|(value, color)| (f64::from(value), color)).collect();
-    let palette = Some(palette).filter(|palette| !palette.is_empty());
+    let palette = Legend::ascending(image_label.get("colors").members().iter().filter_map(color).collect());
     Legend { names, palette, are_labels: image_label.is_some() }
 }
 

@@ -15,7 +15,7 @@ use super::super::grid::{Grid, check_spacing};
 use super::super::loaded::{ASSUMED_AXES, Legend, Loaded};
 use super::super::orientation::Orientation;
 use super::super::series::{MAX_CHANNELS, Series};
-use super::super::voxel::Voxel;
+use super::super::voxels::Voxels;
 use super::array::ZarrArray;
 use super::axes::Axis;
 use super::display;
@@ -121,7 +121,7 @@ impl Image {
     }
 
     /// Values of a level with what the metadata state about all of them.
-    pub(super) fn stated<T: Voxel>(&self, level: usize, values: T::Many) -> Loaded<T> {
+    pub(super) fn stated(&self, level: usize, values: Voxels) -> Loaded {
         let Level { array, grid, first } = &self.levels[level];
         let spacing = Some(grid.spacing).filter(|_| !self.is_plain);
         let assumed_axes = Some(ASSUMED_AXES).filter(|_| array.are_axes_assumed);

@@ -35,11 +35,22 @@ use super::grid::{SIZES, dims_of};
 use super::loaded::{Levels, Loaded};
 use super::store::{Store, StoreLevel, check_box, check_chunk};
 use super::voxel::{Many, Voxel};
+use super::voxels::{Voxels, Wanted};
 use super::{Grid, StoreFacts, Values, VolumeError};
 use crate::StoreCounts;
 
 /// Reads an image at one level.
-pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, VolumeError> {
+pub(super) fn read(path: &Path, access: &Access) -> Result<Loaded, VolumeError> {
+    match access.wanted() {
+        Wanted::Values => read_as::<f32>(path, access),
+        Wanted::Ids => read_as::<u64>(path, access),
+    }
+}
+
+fn read_as<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded, VolumeError>
+where
+    Voxels: From<T::Many>,
+{
     let mut image = Image::open(path, access)?;
     let selection = access.selection();
     image.series.check(path, selection)?;
@@ -89,7 +100,7 @@ pub(super) fn read<T: Voxel>(path: &Path, access: &Access) -> Result<Loaded<T>, 
     };
     let dims_of_levels = image.levels.iter().map(|level| level.grid.dims).collect();
     let levels = Some(Levels { dims: dims_of_levels, level: number as u32, grid: level.grid, reads });
-    Ok(Loaded { levels, ..image.stated::<T>(number, values) })
+    Ok(Loaded { levels, ..image.stated(number, values.into()) })
 }
 
 /// The grids of an image's levels, from the finest.
@@ -141,7 +152,7 @@ pub(super) fn open(path: &Path, format: &'static str, access: &Access) -> Result
     let image = Arc::new(image);
     let levels = image.levels.iter().map(|level| StoreLevel { grid: level.grid, chunk: level.array.chunk_dims() });
     let levels: Vec<StoreLevel> = levels.collect();
-    let stated = image.stated::<f32>(0, Values::default());
+    let stated = image.stated(0, Values::default().into());
     let time = u64::from(selection.time.unwrap_or(0));
     let store = |(at, channel): (usize, u32)| {
         let facts = stated.facts(format, channel as usize, at);

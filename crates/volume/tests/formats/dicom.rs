@@ -1,5 +1,6 @@
 //! DICOM as pydicom writes it, and invalid series.
 
+mod segments;
 mod several;
 
 use sheetsplat_volume::{Encoding, Labels, ReadOptions, SampleType};

@@ -18,6 +18,7 @@ mod holes;
 mod http;
 mod in_memory;
 mod label_grids;
+mod label_ids;
 mod limits;
 mod metaimage;
 mod mgh;

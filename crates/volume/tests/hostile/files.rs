@@ -46,7 +46,7 @@ fn victims(folder: &Path) -> Vec<Victim> {
                     "part0.bin" => to.join("list.mhd"),
                     "part1.bin" => to.join("pattern.nhdr"),
                     "two.npz" => to.join("two.npz:values"),
-                    _ if to == folder || to.ends_with("channels") => copy.clone(),
+                    _ if to == folder || to.ends_with("channels") || to.ends_with("dicom") => copy.clone(),
                     _ => to.to_owned(),
                 };
                 victims.push(Victim { file: copy, open });
@@ -54,7 +54,7 @@ fn victims(folder: &Path) -> Vec<Victim> {
         }
     };
     files(&fixtures, folder);
-    for slices in ["series", "slices", "channels"] {
+    for slices in ["series", "slices", "channels", "dicom"] {
         files(&fixtures.join(slices), &folder.join(slices));
     }
     // A store in an archive.

@@ -73,6 +73,8 @@ struct Info {
     levels: Option<Vec<[u32; 3]>>,
     /// The level that the fields below, and sizes and spacing, are about.
     level: u32,
+    /// The file's numbers of labels, by labels from 0 on, where these stand for others.
+    ids: Option<Vec<u64>>,
     /// Voxels whose samples are NaN or infinite; the fields below are about the others.
     holes: u64,
     min: f64,
@@ -140,6 +142,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         series: volume.series_names().to_vec(),
         levels: Some(levels(&opened)).filter(|levels| !levels.is_empty()),
         level: opened.level(),
+        ids: volume.label_ids().map(<[_]>::to_vec),
         holes: volume.holes(),
         min,
         max,
@@ -219,6 +222,9 @@ fn described(info: &Info, volume: &Volume, first_channel: u32) -> String {
     }
     if let Some(found) = labels(volume) {
         line("labels", found.to_owned());
+    }
+    if let Some(ids @ [first, .., last]) = volume.label_ids() {
+        line("ids", format!("{first} to {last}; values and labels below are their places, 0 to {}", ids.len() - 1));
     }
     if let Some([x, y, z]) = info.sample {
         line(

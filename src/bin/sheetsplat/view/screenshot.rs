@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use eframe::egui::{ColorImage, Rect};
 use sheetsplat::image::{Image, output};
-use sheetsplat::scene::Scene;
+use sheetsplat::scene::{Scene, TransferSettings};
 use sheetsplat::settings::TransferFunction;
 use sheetsplat::volume::Volume;
 
@@ -24,7 +24,7 @@ pub(super) fn save_scene(
     volume: &Volume,
     path: &Path,
 ) -> Result<(), Failure> {
-    let scene = Scene { transfer: transfer.clone().into(), ..scene.clone() };
+    let scene = Scene { transfer: TransferSettings::stating(transfer.clone(), volume), ..scene.clone() };
     let text = scene_file(&scene.explicit(volume), path)?;
     output::write(path, &text).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
 }
