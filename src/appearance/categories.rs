@@ -6,8 +6,6 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 
 use super::quantile::histogram;
-#[cfg(not(target_arch = "wasm32"))]
-use crate::parallel::prelude::*;
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::volume::{Volume, are_sharp};
 

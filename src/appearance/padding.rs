@@ -1,6 +1,5 @@
 //! The padding that CT scanners write outside the scanned cylinder.
 
-#[cfg(not(target_arch = "wasm32"))]
 use crate::volume::ValueSlice;
 
 /// Air in Hounsfield units.

@@ -8,7 +8,6 @@ use super::hounsfield::Hounsfield;
 use super::object::Object;
 use super::quantile::quantiles;
 use super::{categories, channel_display, xray};
-#[cfg(not(target_arch = "wasm32"))]
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Compositing, Interpolation, Splatting};

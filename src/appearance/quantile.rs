@@ -1,7 +1,6 @@
 //! Histograms, and exact quantiles without sorting.
 
 use crate::lists::iso_range::{of_ordinal, ordinal};
-#[cfg(not(target_arch = "wasm32"))]
 use crate::volume::ValueSlice;
 
 /// The number of values that one thread counts at a time.

@@ -2,7 +2,6 @@
 
 use super::padding::{AIR, is_padded};
 use super::quantile::quantiles;
-#[cfg(not(target_arch = "wasm32"))]
 use crate::volume::ValueSlice;
 
 pub(super) const BINS: usize = 256;

@@ -5,7 +5,6 @@ use super::hounsfield::offset_of;
 use super::object::Object;
 use super::preset::Preset;
 use super::quantile::quantiles;
-#[cfg(not(target_arch = "wasm32"))]
 use crate::volume::{ValueSlice, Volume};
 
 /// Hounsfield units of air, of soft tissue, and of everything denser than lungs.

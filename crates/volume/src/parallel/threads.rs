@@ -52,9 +52,15 @@ mod single {
     }
 
     /// The page's only thread.
+    #[derive(Debug)]
     pub struct ThreadPool;
 
     impl ThreadPool {
+        /// Calls the function.
+        pub fn spawn(&self, work: impl FnOnce()) {
+            work();
+        }
+
         /// Calls the function.
         pub fn install<R>(&self, work: impl FnOnce() -> R) -> R {
             work()
