@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use sheetsplat::headless::{Headless, HeadlessView};
+use sheetsplat::image::ImageError;
 use sheetsplat::scene::{OpenVolume, Scene};
 use sheetsplat::volume::ReadOptions;
 use sheetsplat::{RenderError, StoredLight};
@@ -30,7 +31,8 @@ pub(crate) struct Arguments {
 /// Makes a scene's light sheets.
 pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
     let Arguments { input, output } = arguments;
-    StoredLight::check_format(output)?;
+    let refused = |error: ImageError| Failure::Input(error.to_string());
+    StoredLight::check_format(output).map_err(refused)?;
     let scene = input.scene()?;
     let outputs = Outputs::check(&[("--output", output)], false, &input.files(&scene))?;
     let scene = input.choose_levels(&scene, Scene::explicit)?;
@@ -40,7 +42,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let bar = Progress::of_chunks(progress);
     let light = StoredLight::of(&bar.watch(volume), &scene).map_err(|error| input.failure(error))?;
     drop(bar);
-    outputs::write(&[(output, light.encode(output)?)], &[])
+    outputs::write(&[(output, light.encode(output).map_err(refused)?)], &[])
 }
 
 /// Light that was made before.
