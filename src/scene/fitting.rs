@@ -4,7 +4,7 @@ use crate::appearance::Preset;
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Splatting;
-use crate::volume::Grid;
+use crate::volume::{Grid, Volume, builtin};
 
 /// The pixels along a side of light sheets that a preset takes at most, unless the volume has more at the greatest step.
 const MOST_PIXELS: f64 = 257.0;
@@ -105,4 +105,11 @@ impl Fitting {
         let is_open = self.compositing && stated.compositing == Splatting::default().compositing;
         Splatting { compositing: if is_open { preset.compositing() } else { stated.compositing }, ..stated }
     }
+}
+
+/// Whether a volume is the builtin head, of any size: it comes from no file, and its labels have the names of the head's.
+pub(super) fn is_builtin_head(volume: &Volume) -> bool {
+    let (names, head) = (volume.label_names(), builtin::labels("head").unwrap_or_default());
+    let is_named = |(label, name): &(u16, &str)| names.get(label).is_some_and(|named| named == name);
+    volume.encoding().is_none() && names.len() == head.len() && head.iter().all(is_named)
 }

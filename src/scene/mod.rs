@@ -29,6 +29,7 @@ pub use channel::Channel;
 pub use definition::Scene;
 pub use error::SceneError;
 pub use fitting::Fitting;
+use fitting::is_builtin_head;
 pub use image_settings::ImageSettings;
 pub use open::OpenVolume;
 pub use source::VolumeSource;
@@ -249,7 +250,7 @@ impl Scene {
         let preset = Preset::suggested(volume).unwrap_or(Preset::None);
         let transfer = TransferSettings { preset: Some(preset), ..self.transfer.clone() };
         // The surface that stands out of the builtin head is its skin.
-        let lit_by = if preset == Preset::None && self.volume.is_builtin_head() { Preset::CtSkin } else { preset };
+        let lit_by = if preset == Preset::None && is_builtin_head(volume) { Preset::CtSkin } else { preset };
         let shading = step(self.fitting.shading(self.shading, lit_by), lit_by);
         let mut splatting = self.fitting.splatting(self.splatting, preset);
         let clip = self.fitting.clip(self.clip.clone(), preset);

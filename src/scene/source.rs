@@ -26,9 +26,4 @@ impl VolumeSource {
             Self::Builtin(_) | Self::Memory => None,
         }
     }
-
-    /// Whether it is the phantom of a head, of any size.
-    pub(crate) fn is_builtin_head(&self) -> bool {
-        matches!(self, Self::Builtin(name) if name.split(':').next() == Some("head"))
-    }
 }

@@ -1,4 +1,4 @@
-//! What describes light sheets, as JSON in their file.
+//! The description of light sheets, as JSON in their file.
 
 use std::path::Path;
 use std::sync::Arc;

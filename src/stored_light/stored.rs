@@ -19,7 +19,7 @@ pub struct StoredLight {
     pub(super) name: String,
     /// The fingerprint of what keeps light off.
     pub(super) matter: String,
-    /// Of occlusion and of shadow.
+    /// The stacks of occlusion and of shadow.
     pub(super) stacks: [Option<(LightSource, Arc<LightSheets>)>; 2],
 }
 

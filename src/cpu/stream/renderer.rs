@@ -175,7 +175,7 @@ impl StreamRenderer {
         let threads = self.threads();
         let stream = Arc::new(self.stream((scene, view), &window)?);
         let lights = match self.given.clone() {
-            // It is given for the sample's voxels.
+            // Given light has the sample's grid.
             Some(mut given) => {
                 let lights = given.lights((&self.volume.sample, &self.transfer), scene, &scene.camera)?;
                 lights.map(|lights| Arc::new(lights.on(&grid)))

@@ -6,7 +6,7 @@ use glam::{DVec3, UVec3};
 use sheetsplat::appearance::Preset;
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::{Gradient, Light, Shading};
-use sheetsplat::volume::Volume;
+use sheetsplat::volume::{Volume, builtin};
 
 use crate::common::compare::assert_at_least;
 use crate::common::images::rms;
@@ -83,12 +83,15 @@ fn stated_keys_of_light_win() {
             assert_eq!(read.explicit(&volume).shading, scene.explicit(&volume).shading, "{text}");
         }
     }
+    // The volume that is drawn decides, not the one that the scene names.
+    let cube = builtin::volume("cube:12").unwrap();
+    let unlit = Shading { gradient: Gradient::Differences, ..Shading::default() };
+    assert_eq!(scene(&[]).explicit(&cube).shading, unlit);
     // A transfer function of its own, or no preset, leaves the head in the headlight.
     for sets in [&["preset=none"], &["transfer.opacity=[[30,0],[60,0.8]]"]] {
         let scene = scene(sets);
         let volume = scene.load_volume().unwrap();
-        let expected = Shading { gradient: Gradient::Differences, ..Shading::default() };
-        assert_eq!(scene.explicit(&volume).shading, expected, "{sets:?}");
+        assert_eq!(scene.explicit(&volume).shading, unlit, "{sets:?}");
     }
 }
 
