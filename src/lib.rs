@@ -134,6 +134,7 @@ mod rendering;
 pub mod scene;
 pub mod settings;
 pub mod stats;
+mod stored_light;
 pub mod volume;
 
 use sheetsplat_volume::internals::parallel;
@@ -169,6 +170,7 @@ pub use scene::Scene;
 pub use settings::Camera;
 pub use sheetsplat_volume::SettingError;
 pub use stats::Stats;
+pub use stored_light::StoredLight;
 pub use volume::Volume;
 // The libraries whose types stand in this one's signatures.
 pub use glam;

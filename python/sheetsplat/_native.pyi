@@ -112,8 +112,15 @@ class Scene:
 @final
 class View:
     def __new__(
-        cls, volume: Volume, scene: Scene, backend: str, adapter: str | None, annotate: Sequence[str]
+        cls,
+        volume: Volume,
+        scene: Scene,
+        backend: str,
+        adapter: str | None,
+        annotate: Sequence[str],
+        light: str | PathLike[str] | None,
     ) -> View: ...
+    def save_light(self, path: str | PathLike[str], inputs: Sequence[Inputs]) -> None: ...
     def set_scene(self, scene: Scene) -> None: ...
     @property
     def backend(self) -> str: ...

@@ -46,6 +46,7 @@ def render(
     backend: str = "cpu",
     memory: int | str | None = None,
     index: str | os.PathLike[str] | None = None,
+    light: str | os.PathLike[str] | None = None,
     **settings: Any,
 ) -> Future:
     """Draws a picture by the workers of a Dask cluster.
@@ -69,6 +70,8 @@ def render(
         workers differ, because parts of a streamed volume do not merge with those of one in memory.
     index : str or path, optional
         The ranges of the values in the chunks of a volume that is streamed, as for `Volume`; every worker reads it.
+    light : str or path, optional
+        Light sheets of the same scene, as for `View`; every worker reads them.
 
     Returns
     -------
@@ -83,7 +86,7 @@ def render(
     ``splatting.opacity_threshold = 1`` they are the whole picture's to rounding.
     """
     client = client or default_client()
-    what, look = _sent(client, source, spacing, labels, scene, settings, memory, index)
+    what, look = _sent(client, source, spacing, labels, scene, settings, memory, index, light)
     count = _count(client, parts)
     start = _prepare(what, look, side, backend, False)
     return client.compute(_picture(what, start, 0.0, count, backend), retries=3)
@@ -104,13 +107,14 @@ def orbit(
     backend: str = "cpu",
     memory: int | str | None = None,
     index: str | os.PathLike[str] | None = None,
+    light: str | os.PathLike[str] | None = None,
     **settings: Any,
 ) -> list[Future]:
     """Draws a turntable by the workers of a Dask cluster: a future for each picture.
 
     Parameters
     ----------
-    source, scene, client, spacing, labels, side, backend, memory, index, **settings
+    source, scene, client, spacing, labels, side, backend, memory, index, light, **settings
         As for `render`.
     count, turn, frames
         As for `View.orbit`.
@@ -123,7 +127,7 @@ def orbit(
         The pictures, as for `render`.
     """
     client = client or default_client()
-    what, look = _sent(client, source, spacing, labels, scene, settings, memory, index)
+    what, look = _sent(client, source, spacing, labels, scene, settings, memory, index, light)
     numbers, count_of_parts, turn = _frames(count, frames), _count(client, parts), finite("turn", turn)
     start = _prepare(what, look, side, backend, True)
     pictures = [_picture(what, start, turn / count * frame, count_of_parts, backend) for frame in numbers]
@@ -142,12 +146,13 @@ class _Source:
     labels: Any
     memory: int | str | None
     index: str | os.PathLike[str] | None
+    light: str | os.PathLike[str] | None
 
     def view(self, scene: Scene, side: str | None, backend: str) -> View:
         # Every worker opens it for the same scene, which decides the level.
         memory = _limit() if self.memory is None else self.memory
         volume = _opened(self.what, self.look, self.spacing, self.labels, memory, False, self.index)
-        return View(volume, scene=scene, side=side, backend=backend)
+        return View(volume, scene=scene, side=side, backend=backend, light=self.light)
 
 
 def _limit() -> int | None:
@@ -165,6 +170,7 @@ def _sent(
     settings: dict[str, Any],
     memory: int | str | None,
     index: str | os.PathLike[str] | None,
+    light: str | os.PathLike[str] | None,
 ) -> tuple[Any, Scene]:
     """The source as the workers get it, sent once to each that needs it, and the scene, which is checked here."""
     if isinstance(source, Volume):
@@ -177,12 +183,12 @@ def _sent(
         if isinstance(source, (str, os.PathLike)):
             path = os.fsdecode(source)
             source = path if path.startswith(_BUILTIN) or "://" in path else os.path.abspath(path)
-    index = None if index is None else os.path.abspath(index)
+    index, light = (None if path is None else os.path.abspath(path) for path in (index, light))
     token = uuid.uuid4().hex
     if dask.is_dask_collection(source) or dask.is_dask_collection(labels):
         # The cluster computes it before the parts: a part that computed it would wait for the workers that wait for it.
-        return _task(_Source, "source")(token, source, look, spacing, labels, memory, index), look
-    return client.scatter(_Source(token, source, look, spacing, labels, memory, index), hash=False), look
+        return _task(_Source, "source")(token, source, look, spacing, labels, memory, index, light), look
+    return client.scatter(_Source(token, source, look, spacing, labels, memory, index, light), hash=False), look
 
 
 def _count(client: Client, parts: int | None) -> int:

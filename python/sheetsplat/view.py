@@ -56,6 +56,8 @@ class View:
         Words beside every picture, which then takes less of the image: ``"scale"``, a bar of a round length;
         ``"colors"``, the colour of each value, for each channel; ``"legend"``, the colour of each label or channel;
         ``"sides"``, the sides of the patient (R, L, A, P, S, I).
+    light : str or path, optional
+        Light sheets that `save_light` or ``sheetsplat light`` has made of the same scene: the same pictures, sooner.
     **settings
         Settings over those of `scene`, as for `Scene`.
 
@@ -86,6 +88,7 @@ class View:
         progress: bool = True,
         index: str | os.PathLike[str] | None = None,
         annotate: str | Sequence[str] = (),
+        light: str | os.PathLike[str] | None = None,
         **settings: Any,
     ) -> None:
         volume, look = _what_and_how(source, spacing, labels, scene, settings, memory, progress, index)
@@ -93,7 +96,7 @@ class View:
             look = look.seen_from(volume, side)
         self._volume, self._scene = volume, look
         self._annotate = names(annotate)
-        self._native = native.View(volume._native, look._native, backend, adapter, self._annotate)
+        self._native = native.View(volume._native, look._native, backend, adapter, self._annotate, light)
         self._inputs = [volume._native.inputs]
 
     @property
@@ -130,6 +133,21 @@ class View:
             If a key is unknown, a value is not allowed, or the backend does not draw it.
         """
         self.scene = self._scene.replace(**settings)
+
+    def save_light(self, path: str | os.PathLike[str]) -> None:
+        """Saves the view's light sheets, for `View` with ``light``, and ``sheetsplat render --light``.
+
+        Parameters
+        ----------
+        path : path
+            ``.npz``.
+
+        Raises
+        ------
+        SceneError
+            If the view has neither occlusion nor a shadow, or nothing keeps light off.
+        """
+        self._native.save_light(path, self._inputs)
 
     def render(self, **settings: Any) -> Image:
         """Draws a picture.
@@ -329,7 +347,7 @@ def render(source: Any, **arguments: Any) -> Image:
         What is drawn: an array ``[z, y, x]``, an image of SimpleITK or nibabel, a path, a `Volume` or a `Scene`.
     **arguments
         As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, `progress`, `index`,
-        `annotate`, and settings.
+        `annotate`, `light`, and settings.
 
     Returns
     -------

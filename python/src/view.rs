@@ -1,17 +1,19 @@
 //! Views of a volume, drawn by any backend without holding Python's lock.
 
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use numpy::PyArray3;
 use pyo3::prelude::*;
+use sheetsplat::StoredLight;
 use sheetsplat::annotate::{Annotation, Layout, layout};
 use sheetsplat::golden::Subject;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions, HeadlessView};
 use sheetsplat::scene::OpenVolume;
 
 use crate::error::{Raised, forked, setting};
-use crate::image;
+use crate::image::{self, Inputs};
 use crate::part::{Part, window};
 use crate::process::{detached, is_forked, may_commit};
 use crate::scene::{Scene, annotations};
@@ -67,6 +69,7 @@ impl View {
         backend: &str,
         adapter: Option<String>,
         annotate: Vec<String>,
+        light: Option<PathBuf>,
     ) -> PyResult<Self> {
         let annotations = annotations(&annotate)?;
         let backend: Backend = backend.parse().map_err(|allowed: String| {
@@ -78,7 +81,12 @@ impl View {
             let headless = headless(backend, adapter, &scene)?;
             let start = Instant::now();
             let (layout, scene) = worded(&annotations, volume.sample(), scene)?;
+            let light = light.map(|path| StoredLight::open(&path)).transpose()?;
             let view = headless.view(volume, &scene)?;
+            let view = match light {
+                Some(light) => view.with_light(Arc::new(light))?,
+                None => view,
+            };
             let current = Current { view, layout, size: size(&scene), prepare_ms: milliseconds_since(start) };
             let current = Mutex::new(current);
             let is_bound = is_streamed || headless.backend() == Backend::Gpu;
@@ -106,6 +114,22 @@ impl View {
             current.size = size(&scene);
             current.prepare_ms = milliseconds_since(start);
             Ok(())
+        })
+    }
+
+    /// Writes the view's light sheets into a file.
+    fn save_light(&self, py: Python<'_>, path: PathBuf, inputs: Vec<PyRef<'_, Inputs>>) -> PyResult<()> {
+        image::refuse(&inputs, [&path])?;
+        let shared = Arc::clone(&self.0);
+        detached(py, move || {
+            StoredLight::check_format(&path)?;
+            shared.check_process()?;
+            let (volume, scene) = {
+                let current = shared.lock();
+                (current.view.volume(), current.view.scene().clone())
+            };
+            let bytes = StoredLight::of(&volume, &scene)?.encode(&path)?;
+            image::output(&path, &bytes)
         })
     }
 

@@ -74,3 +74,23 @@ def test_what_does_not_fit_together_is_named(view, tmp_path):
         Part.open(tmp_path / "none.exr")
     with pytest.raises(TypeError):
         Part()
+
+
+def test_light_from_a_file_gives_the_same_pictures(tmp_path):
+    look = {
+        "transfer": {"opacity": [[40, 0], [70, 0.6]]},
+        "shading": {"light": [-1, -2, 2], "shadow": 0.8},
+        "image": {"width": 40, "height": 30},
+    }
+    view, path = sheetsplat.View("builtin:head:24", **look), tmp_path / "light.npz"
+    view.save_light(path)
+    lit = sheetsplat.View("builtin:head:24", light=path, **look)
+    np.testing.assert_array_equal(lit.render(), view.render())
+    assert "light_ms" in view.render().stats and "light_ms" not in lit.render().stats
+    with pytest.raises(sheetsplat.SceneError, match=r"shadow\.spread"):
+        lit.set(shading={"shadow_spread": 0.25})
+    np.testing.assert_array_equal(lit.render(), view.render())
+    with pytest.raises(sheetsplat.ImageError, match="extension"):
+        view.save_light(tmp_path / "light.png")
+    with pytest.raises(sheetsplat.SceneError, match="without light sheets"):
+        sheetsplat.View("builtin:nerve:16").save_light(path)

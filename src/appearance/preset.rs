@@ -9,7 +9,7 @@ use super::object::Object;
 use super::quantile::quantiles;
 use super::{categories, channel_display, xray};
 use crate::settings::clip::Clip;
-use crate::settings::shading::Shading;
+use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{Compositing, Interpolation, Splatting};
 use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::volume::{ValueSlice, Volume};
@@ -65,10 +65,12 @@ impl Preset {
     pub fn shading(self) -> Shading {
         let shading = Shading::default();
         match self {
-            Self::CtSkin | Self::Fusion | Self::None => shading,
+            Self::Fusion | Self::None => shading,
+            Self::CtSkin => Shading { ambient: 0.7, diffuse: 0.45, ..lit() },
             // Where a cut opens a head, gradients are mostly noise.
-            Self::MrHead => Shading { ambient: 0.4, diffuse: 0.6, specular: 0.1, ..shading },
-            Self::CtBone | Self::CtVessels => Shading { specular: 0.35, shininess: 40.0, ..shading },
+            Self::MrHead => Shading { ambient: 0.85, diffuse: 0.45, specular: 0.1, ..lit() },
+            Self::CtBone => Shading { ambient: 0.75, diffuse: 0.45, specular: 0.3, shininess: 40.0, ..lit() },
+            Self::CtVessels => Shading { specular: 0.35, shininess: 40.0, ..shading },
             Self::Xray | Self::Mip | Self::Confocal => Shading { enabled: false, ..shading },
             // Photographs are lit already, and gradients within matter of one colour are mostly noise.
             Self::Photo => Shading { enabled: false, ..shading },
@@ -159,6 +161,11 @@ impl Preset {
     pub fn suits(self, volume: &Volume) -> bool {
         self != Self::Labels || volume.labels().is_some() || categories::values(volume).is_some()
     }
+}
+
+/// Light by sheets (SPEC §14) for one opaque surface. Ambient light carries the occlusion, so that presets state more of it than the default.
+fn lit() -> Shading {
+    Shading { light: Light::UpperLeft, occlusion: 0.7, shadow: 0.5, ..Shading::default() }
 }
 
 fn ct(values: ValueSlice<'_>, color: &Points<[f64; 3]>, opacity: &Points<f64>) -> TransferFunction {

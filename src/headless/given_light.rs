@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
 #[cfg(feature = "gpu")]
 use crate::gpu::light_texture::LightTexture;
 use crate::light::{KeptLight, Lights, StreamedLight};
@@ -12,6 +13,7 @@ use crate::reference;
 use crate::rendering::Backend;
 use crate::scene::{OpenVolume, Scene};
 use crate::stats::Stats;
+use crate::stored_light::StoredLight;
 use crate::volume::StreamedVolume;
 
 /// Light as a backend takes it.
@@ -93,6 +95,22 @@ impl GivenLight {
         }
         let lights = light.lights((volume, &transfer), scene)?;
         Ok(lights.map(|lights| Self::new(Form::Sheets(lights))))
+    }
+
+    /// The light of a file, for a scene of a volume.
+    ///
+    /// # Errors
+    /// If the file's light is another scene's, or the backend is the f64 evaluation, which makes its own.
+    pub(super) fn of_stored(
+        stored: &StoredLight,
+        (volume, scene): (&OpenVolume, &Scene),
+        backend: Backend,
+    ) -> Result<Self, RenderError> {
+        if backend == Backend::Reference {
+            let allowed = "backend \"gpu\" or \"cpu\", or light of its own";
+            return Err(SettingError::new("light", "stored light for backend \"reference\"", allowed).into());
+        }
+        Ok(Self::new(Form::Sheets(stored.lights(volume, scene)?)))
     }
 
     /// The light as a native backend or a GPU keeps it.

@@ -4,7 +4,7 @@ use web_time::Instant;
 
 use super::Headless;
 use super::boxed::opaque_values;
-use super::given_light::GivenLight;
+use super::given_light::{GivenLight, Noted};
 use super::timed::milliseconds_since;
 use super::view::HeadlessView;
 use crate::error::RenderError;
@@ -19,11 +19,15 @@ use crate::stats::{Counts, Stats, StoreCounts};
 use crate::volume::StreamedVolume;
 
 /// Draws a frame of channels whose images add up, of a volume that is streamed.
-pub(super) fn draw(volume: &StreamedVolume, scene: &Scene, headless: &Headless) -> Result<Rendering, RenderError> {
+pub(super) fn draw(
+    (volume, scene): (&StreamedVolume, &Scene),
+    light: Option<&GivenLight>,
+    headless: &Headless,
+) -> Result<Rendering, RenderError> {
     let explicit = scene.explicit(&volume.sample);
     let ImageSettings { width, height, background } = explicit.image;
     let mut pixels = vec![[0.0; 4]; width as usize * height as usize];
-    let stats = each_channel(headless, (&volume.clone().into(), &explicit), |view| {
+    let stats = each_channel(headless, (&volume.clone().into(), &explicit), light, |view| {
         let Some(view) = view else { return Ok(None) };
         let Rendering { image, stats } = headless.draw(view)?;
         Joining::Sum.join((&mut pixels, &mut [0.0; 0]), (&image.pixels, &[]));
@@ -36,7 +40,7 @@ pub(super) fn draw(volume: &StreamedVolume, scene: &Scene, headless: &Headless) 
 /// Draws a part of every channel's image. Merging adds these up.
 pub(super) fn draw_part(
     (volume, scene): (&OpenVolume, &Scene),
-    window: &Window,
+    (window, light): (&Window, Option<&GivenLight>),
     headless: &Headless,
 ) -> Result<(Part, Stats), RenderError> {
     part::check(volume.sample(), scene, window)?;
@@ -45,7 +49,7 @@ pub(super) fn draw_part(
     let view = ViewGeometry::new(volume.grid(), &explicit.camera, &explicit.splatting, [width, height])?;
     let identity = Identity::of((volume, scene), &view)?;
     let mut contents = Vec::new();
-    let stats = each_channel(headless, (volume, &explicit), |view| {
+    let stats = each_channel(headless, (volume, &explicit), light, |view| {
         let Some(view) = view else {
             contents.push(Content::empty(window.region.pixels(), identity.has_extremes()));
             return Ok(None);
@@ -61,6 +65,7 @@ pub(super) fn draw_part(
 fn each_channel(
     headless: &Headless,
     (volume, explicit): (&OpenVolume, &Scene),
+    light: Option<&GivenLight>,
     mut draw: impl FnMut(Option<&mut HeadlessView>) -> Result<Option<Stats>, RenderError>,
 ) -> Result<Stats, RenderError> {
     let start = Instant::now();
@@ -70,7 +75,10 @@ fn each_channel(
     let counts = Counts { voxels_total: volume.grid().voxels(), ..Counts::default() };
     let mut all = Stats { width, height, backend, counts, ..Stats::default() };
     let mut store = StoreCounts::default();
-    let light = GivenLight::of_channels((volume, explicit), headless.backend())?;
+    let light = match light {
+        Some(light) => Some((light.clone(), Noted::Nothing)),
+        None => GivenLight::of_channels((volume, explicit), headless.backend())?,
+    };
     for (number, transfer) in explicit.resolve(volume.sample()).channels().enumerate() {
         if opaque_values(transfer).ranges().is_empty() {
             draw(None)?;

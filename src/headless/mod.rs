@@ -141,7 +141,7 @@ impl Headless {
             if backend != self.backend() {
                 return Err(self.refuse(backend).into());
             }
-            return joined::draw_part((&volume, view.scene()), window, self);
+            return joined::draw_part((&volume, view.scene()), (window, view.given_light()), self);
         }
         let (part, stats) = match (&self.drawer, view.backend_mut()) {
             #[cfg(feature = "gpu")]
@@ -221,8 +221,17 @@ impl Headless {
     /// [`CpuRenderer::set_scene`](crate::cpu::CpuRenderer::set_scene) says; on the GPU everything but the uploaded volume, unless only the camera changes.
     ///
     /// # Errors
-    /// As for [`Self::view`], or if another backend made the view; then nothing changes.
+    /// As for [`Self::view`], if another backend made the view, or the view has stored light that is another scene's; then nothing changes.
     pub fn set_scene(&self, view: &mut HeadlessView, scene: &Scene) -> Result<(), RenderError> {
+        let light = view.light_for(scene)?;
+        self.set_unlit_scene(view, scene)?;
+        if let Some(light) = light {
+            view.renew_light(light);
+        }
+        Ok(())
+    }
+
+    fn set_unlit_scene(&self, view: &mut HeadlessView, scene: &Scene) -> Result<(), RenderError> {
         match (&self.drawer, view.backend_mut()) {
             #[cfg(feature = "gpu")]
             (Drawer::Gpu(gpu), ViewBackend::Gpu(view)) => {

@@ -1,17 +1,21 @@
 //! A view of a volume that any backend can draw.
 
+use std::sync::Arc;
+
 use super::Backend;
 use super::boxed::BoxedView;
 use super::given_light::GivenLight;
 use super::reference::ReferenceView;
 #[cfg(feature = "cpu")]
 use crate::cpu::{CpuRenderer, StreamRenderer};
+use crate::error::RenderError;
 use crate::error::setting::{Interval, SettingError};
 #[cfg(feature = "gpu")]
 use crate::renderer::scene_view::SceneView;
 use crate::scene::{OpenVolume, Scene};
 use crate::settings::camera::Camera;
 use crate::stats::StoreCounts;
+use crate::stored_light::StoredLight;
 
 /// A view of a volume for any number of frames, made by [`Headless::view`](super::Headless::view). Frames share the sorted lists.
 #[derive(Debug)]
@@ -19,6 +23,8 @@ pub struct HeadlessView {
     backend: ViewBackend,
     /// What was read of a store for the volume.
     pub(super) reads: Option<StoreCounts>,
+    /// Light that is not made for the view, and as its backend takes it.
+    stored: Option<(Arc<StoredLight>, GivenLight)>,
 }
 
 /// The view of the backend that made it.
@@ -51,7 +57,7 @@ impl ViewBackend {
 
 impl HeadlessView {
     pub(super) fn new(backend: ViewBackend, reads: Option<StoreCounts>) -> Self {
-        Self { backend, reads }
+        Self { backend, reads, stored: None }
     }
 
     pub(super) fn backend_ref(&self) -> &ViewBackend {
@@ -60,6 +66,41 @@ impl HeadlessView {
 
     pub(super) fn backend_mut(&mut self) -> &mut ViewBackend {
         &mut self.backend
+    }
+
+    /// The view in stored light, for which it makes no light sheets. Pictures are the same.
+    ///
+    /// # Errors
+    /// If the light is another scene's, or the backend is the f64 evaluation.
+    pub fn with_light(mut self, light: Arc<StoredLight>) -> Result<Self, RenderError> {
+        let given = GivenLight::of_stored(&light, (&self.volume(), self.scene()), self.backend.backend())?;
+        self.set_light(&given);
+        self.stored = Some((light, given));
+        Ok(self)
+    }
+
+    /// The stored light, for another scene.
+    ///
+    /// # Errors
+    /// If it is not that scene's.
+    pub(super) fn light_for(&self, scene: &Scene) -> Result<Option<GivenLight>, RenderError> {
+        let given = |(light, _): &(Arc<StoredLight>, _)| {
+            GivenLight::of_stored(light, (&self.volume(), scene), self.backend.backend())
+        };
+        self.stored.as_ref().map(given).transpose()
+    }
+
+    /// Draws in the stored light from [`Self::light_for`].
+    pub(super) fn renew_light(&mut self, given: GivenLight) {
+        self.set_light(&given);
+        if let Some((_, stored)) = &mut self.stored {
+            *stored = given;
+        }
+    }
+
+    /// Light that is not made for the view.
+    pub(super) fn given_light(&self) -> Option<&GivenLight> {
+        self.stored.as_ref().map(|(_, given)| given)
     }
 
     /// Draws in light that is made elsewhere.
@@ -107,8 +148,13 @@ impl HeadlessView {
     /// Changes the camera.
     ///
     /// # Errors
-    /// If a setting is not allowed; then nothing changes.
+    /// If a setting is not allowed, or stored light comes from elsewhere for this camera; then nothing changes.
     pub fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
+        if let Some((light, _)) = &self.stored {
+            camera.check()?;
+            let turned = Scene { camera, ..self.scene().clone() };
+            light.check(&turned.explicit(self.volume().sample()))?;
+        }
         match &mut self.backend {
             #[cfg(feature = "gpu")]
             ViewBackend::Gpu(view) => view.set_camera(camera),

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
 use web_time::Instant;
 
 use super::lights::{LightStack, Lights};
@@ -10,6 +9,7 @@ use super::matter::LightMatter;
 #[cfg(feature = "gpu")]
 use super::matter::lit_bricks;
 use super::sheets::LightSheets;
+use super::source::{LightSource, sources};
 use super::view::LightView;
 use crate::error::RenderError;
 use crate::kernel::Kernel;
@@ -26,7 +26,7 @@ use crate::volume::Volume;
 pub struct KeptLight {
     matter: Option<KeptMatter>,
     /// The stacks of occlusion and of shadow.
-    sheets: [Option<(Source, Arc<LightSheets>)>; 2],
+    sheets: [Option<(LightSource, Arc<LightSheets>)>; 2],
     /// Milliseconds that the last call took.
     milliseconds: f64,
     /// Lights that are made elsewhere.
@@ -39,19 +39,6 @@ struct KeptMatter {
     transfer: TransferFunction,
     clip: Clip,
     matter: LightMatter,
-}
-
-/// A stack of sheets depends on this besides the matter.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Source {
-    /// The unit vector to the light.
-    to_light: DVec3,
-    /// The camera's.
-    up: DVec3,
-    spread: f64,
-    step: f64,
-    /// Radius and falloff.
-    kernel: [f64; 2],
 }
 
 impl KeptLight {
@@ -100,8 +87,8 @@ impl KeptLight {
         let is_missing = |number: usize| wanted[number].filter(|_| self.sheets[number].is_none());
         let missing = [is_missing(0), is_missing(1)];
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-        let view = |source: &Source| LightView::new(&matter.grid, scene, camera.up, source.to_light);
-        let variance = |source: &Source| source.spread / source.step;
+        let view = |source: &LightSource| LightView::new(&matter.grid, scene, camera.up, source.to_light);
+        let variance = |source: &LightSource| source.spread / source.step;
         match missing {
             // Both take the same amounts.
             [Some(first), Some(second)] if first.to_light == second.to_light => {
@@ -163,18 +150,4 @@ impl KeptLight {
         }
         Stats { light_ms: Some(self.milliseconds), light_bytes: Some(bytes), ..stats }
     }
-}
-
-/// The sources of the stacks of occlusion and of shadow that a scene with a framed camera has.
-fn sources(scene: &Scene, camera: &Camera) -> [Option<Source>; 2] {
-    let Shading { occlusion, occlusion_spread, shadow, shadow_spread, light_step: step, light, .. } = scene.shading;
-    let basis = camera.basis();
-    let front = -basis.w;
-    let source = |(amount, spread, to_light): (f64, f64, DVec3)| {
-        let kernel = [scene.splatting.radius, scene.splatting.falloff];
-        let is_wanted = amount > 0.0 && scene.shading.enabled;
-        is_wanted.then_some(Source { to_light, up: camera.up, spread, step, kernel })
-    };
-    let to_light = light.direction(&basis).unwrap_or(front);
-    [(occlusion, occlusion_spread, front), (shadow, shadow_spread, to_light)].map(source)
 }

@@ -101,6 +101,19 @@ impl LightSheets {
         stacks.map(|stack| Self { place, side, first: slabs.start, planes: count + 1, light: stack.light })
     }
 
+    /// Sheets that were stored, given where positions are among them, the pixels along each side of a plane, the number of the first plane, and how many there
+    /// are.
+    #[cfg(feature = "codecs")]
+    pub(crate) fn stored(place: [DVec4; 3], side: usize, (first, planes): (i32, usize), light: Vec<f32>) -> Self {
+        Self { place, side, first, planes, light }
+    }
+
+    /// Rows whose products with positions (x, y, z, 1), in `unit`s from the world's origin, are places as [`Self::rows`] tells.
+    #[cfg(feature = "codecs")]
+    pub(crate) fn place(&self) -> [DVec4; 3] {
+        self.place
+    }
+
     /// The number of planes; 0 if no voxel takes part.
     pub fn planes(&self) -> usize {
         self.planes

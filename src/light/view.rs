@@ -7,9 +7,8 @@ use glam::{DVec3, DVec4};
 use crate::error::RenderError;
 use crate::error::setting::{SettingError, scaled};
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::lists::brick::{self, Brick};
+use crate::lists::brick::Brick;
 use crate::lists::quad_plan::Overlaps;
-use crate::parallel::prelude::*;
 use crate::scene::Scene;
 use crate::settings::camera::{Camera, Projection, least_axis};
 use crate::settings::splatting::Splatting;
@@ -65,23 +64,9 @@ impl LightView {
         Ok(Self { view, side: side as usize, place })
     }
 
-    /// The slabs that the kernels of any voxels reach; empty without any. Only voxels of bricks are looked at that may be the first or the last.
+    /// The slabs that the kernels of any voxels reach; empty without any.
     pub(super) fn slabs(&self, bricks: &[Brick]) -> Range<i32> {
-        let view = &self.view;
-        let depths = |brick: &Brick| {
-            let (center, half) = brick::bounds(brick);
-            view.depths(center, half)
-        };
-        // A brick's last voxel at most is the first that a kernel of the brick surrounds, and its first voxel at least is the last.
-        let of_brick = |brick: &Brick| [depths(brick).end - 2.0 * view.reach, -depths(brick).start - 2.0 * view.reach];
-        let least = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].min(b[1])];
-        let has_voxels = |brick: &&Brick| brick::present(brick) != 0;
-        let [near, far] = bricks.par_iter().filter(has_voxels).map(of_brick).reduce(|| [f64::INFINITY; 2], least);
-        // Wider than rounding errors.
-        let margin = view.slabs.width * 1e-6;
-        let is_at_an_end = |brick: &Brick| depths(brick).start <= near + margin || -depths(brick).end <= far + margin;
-        let ends: Vec<Brick> = bricks.par_iter().filter(|brick| is_at_an_end(brick)).copied().collect();
-        Overlaps::count(&ends, view).slabs
+        Overlaps::count(bricks, &self.view).slabs
     }
 }
 

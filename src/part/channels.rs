@@ -55,9 +55,9 @@ pub(super) fn from_channels(channels: &[Vec<f32>]) -> Content {
 }
 
 /// The hash of the bits of channels, in hexadecimal digits.
-pub(super) fn hash_of(channels: &[Vec<f32>]) -> String {
+pub(crate) fn hash_of(channels: &[impl AsRef<[f32]>]) -> String {
     let mut hash = blake3::Hasher::new();
-    for samples in channels.iter().flat_map(|channel| channel.chunks(1 << 14)) {
+    for samples in channels.iter().flat_map(|channel| channel.as_ref().chunks(1 << 14)) {
         let bytes: Vec<u8> = samples.iter().flat_map(|sample| sample.to_le_bytes()).collect();
         hash.update(&bytes);
     }

@@ -3,12 +3,14 @@
 use std::path::Path;
 
 use crate::light::StreamedLight;
-use crate::scene::{OpenVolume, Scene, SceneError, VolumeSource};
+use crate::scene::{Fitting, OpenVolume, Scene, SceneError, VolumeSource};
+use crate::settings::clip::Clip;
 use crate::settings::splatting::Rasterizer;
 use crate::volume::{StreamedVolume, Thinned, Volume};
 
-/// The text that begins what is hashed; another meaning of fingerprints needs another text.
+/// The texts that begin what is hashed; another meaning of fingerprints needs another text.
 const DOMAIN: &str = "sheetsplat part 1\n";
+const DOMAIN_OF_MATTER: &str = "sheetsplat light 1\n";
 
 /// The fingerprint of a scene of a volume, as hexadecimal digits. It is the same on every machine. Of a volume that is streamed it has the identities of its
 /// stores in place of the values.
@@ -21,8 +23,25 @@ pub fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, SceneEr
         explicit.splatting = explicit.splatting.streamed();
     }
     let is_lit = explicit.shading.light_key().is_some();
+    of_settings(DOMAIN, (volume, is_lit), explicit)
+}
+
+/// The fingerprint of what keeps light off in a scene with everything stated (SPEC §14): the volume, transfer functions and cuts.
+///
+/// # Errors
+/// As for [`fingerprint`].
+pub(crate) fn of_matter(volume: &OpenVolume, explicit: &Scene) -> Result<String, SceneError> {
+    let (transfer, further, visible) = (explicit.transfer.clone(), explicit.further.clone(), explicit.visible);
+    // How faces are shaded changes no light.
+    let clip = Clip { shade_faces: Clip::default().shade_faces, ..explicit.clip.clone() };
+    let matter = Scene { transfer, further, visible, clip, fitting: Fitting::NONE, ..Scene::new(VolumeSource::Memory) };
+    of_settings(DOMAIN_OF_MATTER, (volume, true), matter)
+}
+
+/// The hash of settings and a volume; `is_lit` of the voxels that the light of a stream is made of, too.
+fn of_settings(domain: &str, (volume, is_lit): (&OpenVolume, bool), explicit: Scene) -> Result<String, SceneError> {
     let mut hash = blake3::Hasher::new();
-    hash.update(DOMAIN.as_bytes()).update(settings(explicit)?.as_bytes());
+    hash.update(domain.as_bytes()).update(settings(explicit)?.as_bytes());
     let grid = volume.grid();
     for (count, spacing) in grid.dims.to_array().into_iter().zip(grid.spacing.to_array()) {
         hash.update(&count.to_le_bytes()).update(&spacing.to_le_bytes());

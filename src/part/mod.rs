@@ -41,6 +41,8 @@ mod npz;
 mod resolve;
 mod split;
 
+#[cfg(feature = "codecs")]
+pub(crate) use channels::hash_of;
 #[cfg(any(feature = "cpu", feature = "gpu"))]
 pub(crate) use check::check_sheets;
 pub(crate) use check::{adds_up, check};
@@ -49,6 +51,8 @@ pub use identity::{Identity, Part};
 pub use mean::MeanTables;
 pub(crate) use mean::note_labels;
 pub use merge::MergeError;
+#[cfg(feature = "codecs")]
+pub(crate) use npz::archive;
 #[cfg(feature = "cpu")]
 pub(crate) use resolve::Resolver;
 pub use split::split;

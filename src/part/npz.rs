@@ -38,7 +38,7 @@ pub(super) fn encode(path: &Path, part: &Part) -> Result<Vec<u8>, ImageError> {
 }
 
 /// An archive of stored files; `None` if it needs more than the 32 bits of its sizes.
-fn archive(files: &[(&str, &[u8])]) -> Option<Vec<u8>> {
+pub(crate) fn archive(files: &[(&str, &[u8])]) -> Option<Vec<u8>> {
     let (mut bytes, mut directory) = (Vec::new(), Vec::new());
     for (name, file) in files {
         let mut sum = Crc::new();

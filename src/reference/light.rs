@@ -211,18 +211,23 @@ fn sheet(bucket: &[u32], splats: &[Splat], k: i32, geometry: &Geometry, kernel: 
 
 /// The weights of the box filter of a variance in pixels², at offsets from 0 on: 1 up to ⌊h⌋ and `h - ⌊h⌋` behind, each over `2h + 1`.
 pub fn box_weights(variance: f64) -> Vec<f64> {
-    // The variance of a whole h is h(h + 1)/3; between two of them it grows with the last weight.
-    let mut whole = 0.0;
-    while (whole + 1.0) * (whole + 2.0) / 3.0 <= variance {
-        whole += 1.0;
+    let weights = |h: f64| -> Vec<f64> {
+        let offsets = 0..=h.floor() as u32 + 1;
+        offsets.map(|offset| (h + 1.0 - f64::from(offset)).clamp(0.0, 1.0) / (2.0 * h + 1.0)).collect()
+    };
+    let variance_of =
+        |h: f64| (0_u32..).zip(weights(h)).map(|(at, weight)| 2.0 * f64::from(at * at) * weight).sum::<f64>();
+    // The variance grows with h, and that of h is at least h²/3.
+    let [mut low, mut high] = [0.0, (3.0 * variance).sqrt() + 1.0];
+    for _ in 0..100 {
+        let middle = (low + high) / 2.0;
+        if variance_of(middle) <= variance {
+            low = middle;
+        } else {
+            high = middle;
+        }
     }
-    let squares = whole * (whole + 1.0) * (2.0 * whole + 1.0) / 3.0;
-    let next = (whole + 1.0) * (whole + 1.0);
-    let rest = (variance * (2.0 * whole + 1.0) - squares) / (2.0 * (next - variance));
-    let sum = 2.0 * (whole + rest) + 1.0;
-    let mut weights = vec![1.0 / sum; whole as usize + 1];
-    weights.push(rest / sum);
-    weights
+    weights(low)
 }
 
 /// A plane filtered along lines whose pixels are `step` apart, of planes of `width` pixels along each side; beyond the image T is 1.

@@ -4,6 +4,10 @@ use crate::appearance::Preset;
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::Splatting;
+use crate::volume::{Grid, Volume, builtin};
+
+/// The pixels along a side of light sheets that a preset takes at most, unless the volume has more at the greatest step.
+const MOST_PIXELS: f64 = 257.0;
 
 /// The choice of the preset that fits the volume ([`Preset::suggested`]), for a scene without a transfer function: these settings, as long as they have
 /// their defaults, besides colours and opacities. Others than the defaults count as stated.
@@ -21,6 +25,14 @@ pub struct Fitting {
     pub specular: bool,
     /// [`Shading::shininess`].
     pub shininess: bool,
+    /// [`Shading::light`].
+    pub light: bool,
+    /// [`Shading::occlusion`].
+    pub occlusion: bool,
+    /// [`Shading::shadow`].
+    pub shadow: bool,
+    /// [`Shading::light_step`], which depends on the volume's size where a preset lights it, also one that the scene names.
+    pub light_step: bool,
     /// [`Splatting::compositing`].
     pub compositing: bool,
     /// [`Clip::shade_faces`].
@@ -42,6 +54,10 @@ impl Fitting {
             diffuse: is,
             specular: is,
             shininess: is,
+            light: is,
+            occlusion: is,
+            shadow: is,
+            light_step: is,
             compositing: is,
             shade_faces: is,
         }
@@ -59,8 +75,23 @@ impl Fitting {
             diffuse: number(self.diffuse, |shading| shading.diffuse),
             specular: number(self.specular, |shading| shading.specular),
             shininess: number(self.shininess, |shading| shading.shininess),
+            light: if self.light && stated.light == default.light { of_preset.light } else { stated.light },
+            occlusion: number(self.occlusion, |shading| shading.occlusion),
+            shadow: number(self.shadow, |shading| shading.shadow),
             ..stated
         }
+    }
+
+    /// The step of light sheets on a grid, where it is open and a preset lights the volume: the stated one, doubled until sheets have at most
+    /// [`MOST_PIXELS`] along a side, so that large volumes take neither much memory nor long frames.
+    pub(super) fn light_step(self, stated: &Shading, (preset, radius): (Preset, f64), grid: &Grid) -> f64 {
+        let step = stated.light_step;
+        let is_open = self.light_step && step == Shading::default().light_step;
+        if !is_open || preset.shading().light_key().is_none() {
+            return step;
+        }
+        let is_small = |step: &f64| 2.0 * (grid.bounding_radius(radius) / grid.unit() / step).ceil() < MOST_PIXELS;
+        [1.0, 2.0, 4.0].map(|factor| factor * step).into_iter().find(is_small).unwrap_or(8.0 * step)
     }
 
     /// The cuts, with a preset's shading of their faces where it is open.
@@ -74,4 +105,11 @@ impl Fitting {
         let is_open = self.compositing && stated.compositing == Splatting::default().compositing;
         Splatting { compositing: if is_open { preset.compositing() } else { stated.compositing }, ..stated }
     }
+}
+
+/// Whether a volume is the builtin head, of any size: it comes from no file, and its labels have the names of the head's.
+pub(super) fn is_builtin_head(volume: &Volume) -> bool {
+    let (names, head) = (volume.label_names(), builtin::labels("head").unwrap_or_default());
+    let is_named = |(label, name): &(u16, &str)| names.get(label).is_some_and(|named| named == name);
+    volume.encoding().is_none() && names.len() == head.len() && head.iter().all(is_named)
 }

@@ -30,6 +30,7 @@ pub use channel::Channel;
 pub use definition::Scene;
 pub use error::SceneError;
 pub use fitting::Fitting;
+use fitting::is_builtin_head;
 pub use image_settings::ImageSettings;
 pub use open::OpenVolume;
 pub use source::VolumeSource;
@@ -238,12 +239,20 @@ impl Scene {
     /// The scene with the preset that fits a volume, [`Preset::None`] if none does, where it states no appearance: no preset, and nothing of a
     /// transfer function.
     pub fn fitted(&self, volume: &Volume) -> Self {
+        let step = |shading: Shading, preset| {
+            let preset_and_kernel = (preset, self.splatting.radius);
+            let light_step = self.fitting.light_step(&shading, preset_and_kernel, volume.drawn_grid());
+            Shading { light_step, ..shading }
+        };
         if !self.is_fitting() {
-            return self.clone();
+            let shading = self.transfer.preset.map_or(self.shading, |preset| step(self.shading, preset));
+            return Self { shading, ..self.clone() };
         }
         let preset = Preset::suggested(volume).unwrap_or(Preset::None);
         let transfer = TransferSettings { preset: Some(preset), ..self.transfer.clone() };
-        let shading = self.fitting.shading(self.shading, preset);
+        // The surface that stands out of the builtin head is its skin.
+        let lit_by = if preset == Preset::None && is_builtin_head(volume) { Preset::CtSkin } else { preset };
+        let shading = step(self.fitting.shading(self.shading, lit_by), lit_by);
         let mut splatting = self.fitting.splatting(self.splatting, preset);
         let clip = self.fitting.clip(self.clip.clone(), preset);
         if splatting.classification == Classification::Auto && exceeds_digits(volume) {
@@ -262,7 +271,7 @@ impl Scene {
         let fitted = self.fitted(volume);
         let splatting = Splatting { classification: fitted.classification(volume), ..fitted.splatting };
         let shading = Shading { gradient: fitted.gradient(volume), ..fitted.shading };
-        Self { splatting, shading, camera: fitted.camera_for(volume), ..fitted }
+        Self { splatting, shading, camera: fitted.camera_for(volume), fitting: Fitting::NONE, ..fitted }
     }
 
     /// `source` is the volume of a scene whose tables name none.
@@ -304,7 +313,9 @@ impl Scene {
         };
         let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
         let is_open = preset.is_none() && !states_transfer && channels.len() <= 1;
-        let fitting = if is_open { tables::fitting(&shading, &splatting, &clip) } else { Fitting::NONE };
+        let unstated = tables::fitting(&shading, &splatting, &clip);
+        let of_preset = Fitting { light_step: preset.is_some() && unstated.light_step, ..Fitting::NONE };
+        let fitting = if is_open { unstated } else { of_preset };
         let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } =
             channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
         let scene = Self {

@@ -347,6 +347,10 @@ pub(super) fn fitting(shading: &Section, splatting: &Section, clip: &Section) ->
         diffuse: is_open("diffuse"),
         specular: is_open("specular"),
         shininess: is_open("shininess"),
+        light: is_open("light"),
+        occlusion: is_open("occlusion"),
+        shadow: is_open("shadow"),
+        light_step: is_open("light_step"),
         compositing: !splatting.states("compositing"),
         shade_faces: !clip.states("shade_faces"),
     }

@@ -50,11 +50,12 @@ impl Scene {
         }
         write_image(&mut text, image);
         // Settings that the preset that fits is to choose are not written.
-        let fitting = if self.is_fitting() { *fitting } else { Fitting::NONE };
+        let light_step = fitting.light_step && transfer.preset.is_some();
+        let fitting = if self.is_fitting() { *fitting } else { Fitting { light_step, ..Fitting::NONE } };
         let unstated = transfer.preset.map_or_else(Clip::default, Preset::clip).shade_faces;
         let leaves_faces = clip.shade_faces == unstated && fitting.is_open <= fitting.shade_faces;
         write_clip(&mut text, clip, leaves_faces);
-        write_shading(&mut text, shading, fitting);
+        write_shading(&mut text, shading, transfer.preset, fitting);
         write_splatting(&mut text, splatting, fitting);
         Ok(text.text)
     }
@@ -235,8 +236,9 @@ fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
     }
 }
 
-fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
+fn write_shading(text: &mut Text, shading: &Shading, preset: Option<Preset>, fitting: Fitting) {
     let default = Shading::default();
+    let of_preset = preset.map_or(default, Preset::shading);
     let Shading {
         enabled,
         ambient,
@@ -268,6 +270,7 @@ fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
         text.line("shininess", shininess);
     }
     match light {
+        _ if fitting.light && light == default.light => {}
         Light::Headlight => text.line("light", "headlight"),
         Light::UpperLeft => text.line("light", "upper-left"),
         Light::Direction(direction) => text.line("light", vector(direction)),
@@ -276,15 +279,19 @@ fn write_shading(text: &mut Text, shading: &Shading, fitting: Fitting) {
     if gradient != Gradient::Auto {
         text.line("gradient", name_of(GRADIENTS, gradient));
     }
-    // Scenes without light sheets stay as they were, and so do the fingerprints of their parts.
+    // Scenes without light sheets stay as they were, and so do the fingerprints of their parts. Where a preset has or may choose light, its keys are stated.
+    let is_open = fitting.is_open;
+    let has_light = of_preset.light_key().is_some();
     let of_light = [
-        ("occlusion", occlusion, default.occlusion),
-        ("occlusion_spread", occlusion_spread, default.occlusion_spread),
-        ("shadow", shadow, default.shadow),
-        ("shadow_spread", shadow_spread, default.shadow_spread),
-        ("light_step", light_step, default.light_step),
+        ("occlusion", occlusion, default.occlusion, is_open && !fitting.occlusion || has_light),
+        ("occlusion_spread", occlusion_spread, default.occlusion_spread, false),
+        ("shadow", shadow, default.shadow, is_open && !fitting.shadow || has_light),
+        ("shadow_spread", shadow_spread, default.shadow_spread, false),
+        ("light_step", light_step, default.light_step, (is_open || has_light) && !fitting.light_step),
     ];
-    for (key, stated, _) in of_light.into_iter().filter(|(_, stated, default)| stated != default) {
+    for (key, stated, _, _) in
+        of_light.into_iter().filter(|(_, stated, default, is_kept)| stated != default || *is_kept)
+    {
         text.line(key, stated);
     }
 }

@@ -1,7 +1,51 @@
 //! The scenes of the golden images.
 
 /// The scenes: name, builtin volume, and the settings that differ from the defaults. Those whose names begin with `after-` are classified after splatting.
-pub(super) const SCENES: [(&str, &str, &[&str]); 32] = [
+pub(super) const SCENES: [(&str, &str, &[&str]); 36] = [
+    (
+        "head-occlusion",
+        "head:64",
+        &[
+            "image={width=96,height=96,background=[1,1,1,1]}",
+            "camera={direction=[0.5,0.75,-0.3],height=170.0}",
+            "transfer={color=[[0,[0.95,0.85,0.75]]],opacity=[[100,0],[140,0.8]]}",
+            "shading={light=\"upper-left\",ambient=0.8,diffuse=0.4,occlusion=0.8}",
+            "splatting.compositing=\"exponential\"",
+        ],
+    ),
+    (
+        "head-shadow",
+        "head:64",
+        &[
+            "image={width=96,height=96,background=[1,1,1,1]}",
+            "camera={direction=[0.5,0.75,-0.3],height=170.0}",
+            "transfer={color=[[0,[0.95,0.85,0.75]]],opacity=[[100,0],[140,0.8]]}",
+            "shading={light=[-1,-1,1],ambient=0.3,diffuse=0.7,shadow=0.9}",
+            "splatting.compositing=\"exponential\"",
+        ],
+    ),
+    (
+        "after-head-occlusion",
+        "head:64",
+        &[
+            "image={width=96,height=96,background=[1,1,1,1]}",
+            "camera={direction=[0.5,0.75,-0.3],height=170.0}",
+            "transfer={color=[[0,[0.95,0.85,0.75]]],opacity=[[100,0],[140,0.8]]}",
+            "shading={light=\"upper-left\",ambient=0.8,diffuse=0.4,occlusion=0.8}",
+            "splatting.compositing=\"exponential\"",
+        ],
+    ),
+    (
+        "after-head-shadow",
+        "head:64",
+        &[
+            "image={width=96,height=96,background=[1,1,1,1]}",
+            "camera={direction=[0.5,0.75,-0.3],height=170.0}",
+            "transfer={color=[[0,[0.95,0.85,0.75]]],opacity=[[100,0],[140,0.8]]}",
+            "shading={light=[-1,-1,1],ambient=0.3,diffuse=0.7,shadow=0.9}",
+            "splatting.compositing=\"exponential\"",
+        ],
+    ),
     ("head", "head:72", &["image={width=160,height=160}", "camera={direction=[0.5,0.85,-0.2],height=170.0}"]),
     (
         "head-xray",

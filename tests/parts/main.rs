@@ -13,4 +13,5 @@ mod merging;
 mod random;
 mod scans;
 mod splitting;
+mod stored_light;
 mod streamed;

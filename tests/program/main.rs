@@ -18,6 +18,7 @@ mod http;
 mod info;
 mod inputs;
 mod levels;
+mod light;
 mod looks;
 mod orbit;
 mod outputs;

@@ -13,6 +13,7 @@ mod failure;
 mod index;
 mod info;
 mod interrupt;
+mod light;
 mod logging;
 mod look;
 mod memory;
@@ -72,6 +73,8 @@ enum Command {
     Bench(bench::Arguments),
     /// Merge parts, drawn by render --slabs and --region, into the image.
     Merge(parts::merge::Arguments),
+    /// Make a scene's light sheets, for --light.
+    Light(light::Arguments),
     /// Write the ranges of the values in a volume's chunks, for --index.
     Index(index::Arguments),
     /// Print --slabs and --region of parts that take about equal time, a line for each.
@@ -117,6 +120,7 @@ fn main() -> ExitCode {
         Command::Sweep(arguments) => sweep::run(&arguments, progress),
         Command::Bench(arguments) => bench::run(&arguments),
         Command::Merge(arguments) => parts::merge::run(&arguments),
+        Command::Light(arguments) => light::run(&arguments, progress),
         Command::Index(arguments) => index::run(&arguments, progress),
         Command::Split(arguments) => parts::split::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),

@@ -10,6 +10,7 @@ use sheetsplat::scene::{OpenVolume, Scene};
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, scene_file};
 use crate::failure::Failure;
+use crate::light::{self, Stored};
 use crate::look;
 use crate::memory::peak_rss_mib;
 use crate::outputs::{self, Outputs};
@@ -25,7 +26,7 @@ Examples:
   sheetsplat render ct.raw -o ct.png --dims 256,256,113 --type uint16 --endian big
   sheetsplat render ct.nrrd -o skull.png --preset ct-bone --annotate scale --save-scene skull.toml
   sheetsplat render cells.nrrd -o cells.png --preset confocal --colormap magma --annotate scale,colors
-  sheetsplat render scene.toml -o part.exr --slabs 0..64 --region 0,0,512,256")]
+  sheetsplat render scene.toml -o part.exr --slabs 0..64 --region 0,0,512,256 --light light.npz")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
@@ -45,6 +46,8 @@ pub(crate) struct Arguments {
     annotate: Annotate,
     #[command(flatten)]
     part: Part,
+    #[command(flatten)]
+    light: Stored,
     /// Time every stage on the GPU, where the adapter has timestamp queries: stages_ms in the statistics, and printed.
     #[arg(long)]
     profile: bool,
@@ -57,7 +60,9 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let mut named = vec![("--output", output.as_path())];
     named.extend(stats_file.as_deref().map(|path| ("--stats", path)));
     named.extend(save_scene.as_deref().map(|path| ("--save-scene", path)));
-    let outputs = Outputs::check(&named, arguments.profile, &input.files(&scene))?;
+    let inputs = [input.files(&scene), Vec::from_iter(arguments.light.file())].concat();
+    let outputs = Outputs::check(&named, arguments.profile, &inputs)?;
+    let light = arguments.light.open(input)?;
     let start = Instant::now();
     let scene = input.choose_levels(&scene, Scene::explicit)?;
     let volume = input.open_volume(&scene, &outputs)?;
@@ -79,12 +84,17 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let volume = bar.watch(volume);
     let (bytes, mut stats) = match window {
         Some(window) => {
-            let (part, stats) = arguments.part.draw(input, volume, &scene, &window)?;
+            let (part, stats) = arguments.part.draw(input, (volume, &scene), &window, light.as_ref())?;
             (part.encode(output)?, stats)
         }
         None => {
-            let rendering = input.headless(arguments.profile, [&scene])?.render_volume(volume.clone(), &scene);
-            let Rendering { image, stats } = rendering.map_err(|error| input.failure(error))?;
+            let headless = input.headless(arguments.profile, [&scene])?;
+            let start = Instant::now();
+            let view = light::view(&headless, volume.clone(), &scene, light.as_ref());
+            let mut view = view.map_err(|error| input.failure(error))?;
+            let view_ms = start.elapsed().as_secs_f64() * 1e3;
+            let Rendering { image, mut stats } = headless.draw(&mut view).map_err(|error| input.failure(error))?;
+            stats.prepare_ms += view_ms;
             let image = words.draw(image, &scene, volume.sample());
             (image.encode(output, arguments.depth.into())?, stats)
         }

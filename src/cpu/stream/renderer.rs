@@ -175,10 +175,13 @@ impl StreamRenderer {
         let threads = self.threads();
         let stream = Arc::new(self.stream((scene, view), &window)?);
         let lights = match self.given.clone() {
-            Some(mut given) => given.lights((&self.volume.sample, &self.transfer), scene, &scene.camera)?,
+            // Given light has the sample's grid.
+            Some(mut given) => {
+                let lights = given.lights((&self.volume.sample, &self.transfer), scene, &scene.camera)?;
+                lights.map(|lights| Arc::new(lights.on(&grid)))
+            }
             None => self.light.lights((&self.volume, &self.transfer), scene)?,
         };
-        let lights = lights.map(|lights| Arc::new(lights.on(&grid)));
         let host = Host { window, is_part, first_hit: None, surfaces: None, lights };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
             Classification::After => {

@@ -96,7 +96,7 @@ impl BoxedView {
     pub(super) fn draw(&self, headless: &Headless) -> Result<Rendering, RenderError> {
         let start = Instant::now();
         if part::adds_up(&self.volume.sample, &self.scene) {
-            return joined::draw(&self.volume, &self.scene, headless);
+            return joined::draw((&self.volume, &self.scene), self.given.as_ref(), headless);
         }
         let size = [self.scene.image.width, self.scene.image.height];
         let (parts, stats) = self.parts(&Window::whole(size), headless)?;

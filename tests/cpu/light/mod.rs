@@ -2,6 +2,7 @@
 //! `cargo test --test cpu light:: -- --nocapture` prints the measurements.
 
 mod pictures;
+mod presets;
 mod sheets;
 mod streams;
 mod twin;

@@ -9,17 +9,19 @@ use std::cell::Cell;
 use std::io::{self, BufWriter, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use sheetsplat::RenderError;
 use sheetsplat::headless::HeadlessView;
 use sheetsplat::image::Image;
 use sheetsplat::image::output::Target;
 use sheetsplat::internals::fingerprint;
 use sheetsplat::scene::{OpenVolume, Scene};
+use sheetsplat::{RenderError, StoredLight};
 
 use crate::annotate::{Annotate, Words};
 use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees, parse_range, scene_file};
 use crate::failure::Failure;
+use crate::light::{self, Stored};
 use crate::outputs::{self, Outputs};
 use crate::progress::{Progress, tell};
 use made::Made;
@@ -38,6 +40,8 @@ pub(crate) struct Arguments {
     input: Input,
     #[command(flatten)]
     annotate: Annotate,
+    #[command(flatten)]
+    light: Stored,
     /// Numbered images (frame-%04d.png, frame-####.exr), a movie (.apng, .gif, .y4m), or - for YUV4MPEG2 on standard output.
     #[arg(short, long, value_name = "FILES")]
     output: PathBuf,
@@ -68,6 +72,13 @@ pub(crate) struct Arguments {
     chroma: Chroma,
 }
 
+impl Arguments {
+    /// The files that are read and named so far.
+    fn inputs(&self, scene: &Scene) -> Vec<PathBuf> {
+        [self.input.files(scene), Vec::from_iter(self.light.file())].concat()
+    }
+}
+
 pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> {
     let Arguments { input, output, count, overwrite, .. } = arguments;
     let frames = arguments.frames.clone().unwrap_or(0..*count);
@@ -93,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let named = frames.clone().map(|frame| ("--output", pattern.path(frame)));
     let named: Vec<_> = named.chain([("--output", pattern.list())]).chain(scene_file).collect();
     let outputs = Outputs::distinct(named.iter().cloned(), false)?;
-    outputs.refuse(&input.files(&scene))?;
+    outputs.refuse(&arguments.inputs(&scene))?;
     named.iter().try_for_each(|(_, path)| outputs::check_writable(path))?;
     // All frames are in one folder.
     outputs::check_folder(&pattern.list())?;
@@ -141,7 +152,7 @@ fn movie(
     let output_file = (!is_printed).then_some(("--output", output.as_path()));
     let scene_file = arguments.save_scene.as_deref().map(|path| ("--save-scene", path));
     let named: Vec<_> = output_file.into_iter().chain(scene_file).collect();
-    let outputs = Outputs::check(&named, is_printed, &input.files(&scene))?;
+    let outputs = Outputs::check(&named, is_printed, &arguments.inputs(&scene))?;
     // The volume is loaded before anything is written, because the files it was read from are then known.
     let (shown, volume) = Shown::load(arguments, (scene, times), &outputs, false)?;
     let encode = move |to: &mut dyn Write, failed: &dyn Fn(io::Error) -> Failure| {
@@ -173,6 +184,7 @@ struct Shown<'a> {
     outputs: &'a Outputs,
     /// Whether frames that were drawn before may be kept, for which their hashes are needed.
     is_resumed: bool,
+    light: Option<Arc<StoredLight>>,
 }
 
 impl<'a> Shown<'a> {
@@ -183,7 +195,8 @@ impl<'a> Shown<'a> {
         outputs: &'a Outputs,
         is_resumed: bool,
     ) -> Result<(Self, OpenVolume), Failure> {
-        let Arguments { input, annotate, .. } = arguments;
+        let Arguments { input, annotate, light, .. } = arguments;
+        let light = light.open(input)?;
         let scene = input.choose_levels(&scene, Scene::explicit_all_around)?;
         let volume = input.open_volume(&scene, outputs)?;
         let count = volume.sample().encoding().map_or(1, |encoding| encoding.times);
@@ -192,7 +205,7 @@ impl<'a> Shown<'a> {
             return Err(Failure::Input(format!("--time: found {start}..{end}, allowed: {allowed}")));
         }
         let (words, scene) = annotate.settled(input, volume.sample(), &scene, Scene::explicit_all_around)?;
-        Ok((Self { scene, times, words, outputs, is_resumed }, volume))
+        Ok((Self { scene, times, words, outputs, is_resumed, light }, volume))
     }
 
     /// The time that a frame shows: all times take turns over all frames.
@@ -227,6 +240,13 @@ impl<'a> Shown<'a> {
         let Arguments { input, turn, count, save_scene, depth, .. } = arguments;
         let progress = Progress::new(frames.len(), progress);
         let scene = &self.scene;
+        // The angle is relative to the scene's camera, independent of the previous frame.
+        let angle = |frame: u32| turn * f64::from(frame) / f64::from(*count);
+        let turned = |frame: u32| Scene { camera: scene.camera.turned(angle(frame)), ..scene.clone() };
+        if let Some(light) = &self.light {
+            let check = |frame: &u32| light.check(&turned(*frame));
+            frames.iter().try_for_each(check).map_err(|error| input.failure(RenderError::from(error)))?;
+        }
         let mut current = Current { time: scene.time, hash: self.hash(&volume, *depth)?, ..Current::default() };
         current.volume = Some(progress.watch(volume));
         let mut headless = None;
@@ -238,9 +258,7 @@ impl<'a> Shown<'a> {
                 current.hash = self.hash(&volume, *depth)?;
                 current.volume = Some(progress.watch(volume));
             }
-            // The angle is relative to the scene's camera, independent of the previous frame.
-            let angle = turn * f64::from(frame) / f64::from(*count);
-            let shown = current.shown(angle);
+            let shown = current.shown(angle(frame));
             if is_kept(frame, shown) {
                 progress.step();
                 continue;
@@ -250,10 +268,12 @@ impl<'a> Shown<'a> {
                 none => none.insert(input.headless(false, [scene])?),
             };
             if let Some(volume) = current.volume.take() {
-                current.view = Some(headless.view(volume, scene).map_err(|error| input.failure(error))?);
+                // The light is that of the frames.
+                let view = light::view(headless, volume, &turned(frame), self.light.as_ref());
+                current.view = Some(view.map_err(|error| input.failure(error))?);
             }
             let Some(view) = &mut current.view else { continue };
-            let turned = Scene { camera: scene.camera.turned(angle), ..scene.clone() };
+            let turned = turned(frame);
             view.set_camera(turned.camera).map_err(|error| input.failure(RenderError::from(error)))?;
             let rendering = headless.draw(view).map_err(|error| input.failure(error))?;
             let image = self.words.draw(rendering.image, &turned, view.volume().sample());

@@ -5,14 +5,16 @@ pub(crate) mod split;
 
 use std::ops::Range;
 use std::path::Path;
+use std::sync::Arc;
 
-use sheetsplat::Stats;
 use sheetsplat::scene::{OpenVolume, Scene};
 use sheetsplat::settings::{Region, Window};
 use sheetsplat::volume::ReadOptions;
+use sheetsplat::{Stats, StoredLight};
 
 use crate::arguments::Input;
 use crate::failure::Failure;
+use crate::light;
 
 /// The part of an image that is drawn.
 #[derive(clap::Args)]
@@ -84,17 +86,17 @@ impl Part {
         Some(Window { slabs, region: self.region.unwrap_or(whole.region) })
     }
 
-    /// Draws a part.
+    /// Draws a part, in the light of a file if there is one.
     pub(crate) fn draw(
         &self,
         input: &Input,
-        volume: OpenVolume,
-        scene: &Scene,
+        (volume, scene): (OpenVolume, &Scene),
         window: &Window,
+        light: Option<&Arc<StoredLight>>,
     ) -> Result<(sheetsplat::Part, Stats), Failure> {
         let headless = input.headless(false, [scene])?;
         let failed = |error: sheetsplat::RenderError| input.failure(error);
-        let mut view = headless.view(volume, scene).map_err(failed)?;
+        let mut view = light::view(&headless, volume, scene, light).map_err(failed)?;
         headless.draw_part(&mut view, window).map_err(failed)
     }
 }
