@@ -267,6 +267,10 @@ impl GpuVolume {
         }
         let Shared { device, volume, .. } = &*self.shared;
         let uploaded = scoped(device, || membership::upload(device, queue, volume, shaded))??;
+        #[cfg_attr(
+            target_arch = "wasm32",
+            expect(clippy::arc_with_non_send_sync, reason = "a browser's wgpu belongs to one thread")
+        )]
         let uploaded = Arc::new(uploaded);
         *self.kept_membership() = Some((shaded.to_vec(), Arc::clone(&uploaded)));
         Ok(uploaded)
