@@ -58,10 +58,12 @@ def test_goldens_of_the_rust_macro(golden, name):
 def test_arrays_draw_the_golden(golden):
     volume = sheetsplat.Volume("builtin:head:72")
     _, _, settings = SCENES["head"]
-    splatting = {"opacity_threshold": 0.999, "classification": "before"}
+    # The builtin head is lit so by itself.
+    shading = {"light": "upper-left", "ambient": 0.7, "diffuse": 0.45, "occlusion": 0.7, "shadow": 0.5}
+    appearance = {"splatting": {"opacity_threshold": 0.999, "classification": "before"}, "shading": shading}
     for dtype in ("u1", ">f8"):
         values = volume.values.astype(dtype)
-        golden(sheetsplat.render(values, spacing=volume.spacing, splatting=splatting, **settings), "head")
+        golden(sheetsplat.render(values, spacing=volume.spacing, **appearance, **settings), "head")
 
 
 def test_automatic_is_the_cpu(golden):
