@@ -12,6 +12,7 @@ mod label_ramps;
 mod level;
 mod load;
 pub(crate) mod names;
+mod only;
 pub(crate) mod open;
 mod overrides;
 mod reader;

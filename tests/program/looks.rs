@@ -120,6 +120,25 @@ fn presets_and_colour_maps_are_short_for_settings() {
 }
 
 #[test]
+fn one_label_is_drawn_alone() {
+    let folder = Folder::new();
+    let labels = "--set preset=labels --size 40 --backend cpu";
+    folder.render(&format!("builtin:head:32 {labels} --only skull -o only.npy --save-scene only.toml"));
+    folder.render("only.toml --backend cpu -o saved.npy");
+    assert_eq!(folder.read("only.npy"), folder.read("saved.npy"));
+    folder.render(&format!("builtin:head:32 {labels} -o all.npy"));
+    assert_ne!(folder.read("only.npy"), folder.read("all.npy"));
+    let run = folder.run("render builtin:head:32 --only liver -o none.npy");
+    assert_eq!(run.code, Some(2), "{}", run.stderr);
+    assert!(
+        run.stderr.contains("--only: found \"liver\", allowed: ") && run.stderr.contains("\"skull\""),
+        "{}",
+        run.stderr
+    );
+    assert!(!folder.path("none.npy").exists());
+}
+
+#[test]
 fn a_scene_files_colours_give_way_to_a_colour_map_alone() {
     let folder = Folder::new();
     let scene = "[volume]\nbuiltin = \"head:24\"\n[image]\nwidth = 40\nheight = 40\n";

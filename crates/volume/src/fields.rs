@@ -38,7 +38,14 @@ impl Fields {
         parse: impl Fn(Option<&str>) -> Option<T>,
     ) -> Result<T, VolumeError> {
         let text = self.get(name);
-        parse(text).ok_or_else(|| self.invalid(name, text.map_or("no such field".to_owned(), shown), allowed))
+        parse(text).ok_or_else(|| self.refused(name, text, allowed))
+    }
+
+    /// The error for a field's text. It is no part of [`Self::value`], which is compiled for every field.
+    #[cold]
+    #[inline(never)]
+    fn refused(&self, name: &str, text: Option<&str>, allowed: &str) -> VolumeError {
+        self.invalid(name, text.map_or("no such field".to_owned(), shown), allowed)
     }
 
     pub(super) fn invalid(&self, field: &str, found: impl Display, allowed: impl Display) -> VolumeError {

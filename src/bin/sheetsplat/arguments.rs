@@ -64,6 +64,9 @@ pub(crate) struct Input {
     /// and camera.up.
     #[arg(long, value_enum, value_name = "SIDE")]
     pub(crate) view: Option<View>,
+    /// One label alone, by its name or its number in the file: all others are hidden.
+    #[arg(long, value_name = "LABEL")]
+    only: Option<String>,
     /// Degrees by which the eye goes to the right about camera.up, from where it would be.
     #[arg(long, value_name = "DEG", value_parser = parse_degrees, allow_negative_numbers = true)]
     azimuth: Option<f64>,
@@ -361,13 +364,16 @@ impl Input {
         explicit: impl Fn(&Scene, &Volume) -> Scene,
     ) -> Result<Scene, Failure> {
         let mut scene = scene.clone();
-        self.look_at(volume, &mut scene)?;
+        self.choose_view(volume, &mut scene)?;
         scene.check_volume(volume).map_err(|error| self.failure(RenderError::from(error)))?;
         Ok(explicit(&scene, volume))
     }
 
-    /// Turns the scene's camera to the side of the patient given by --view, and by --azimuth and --elevation.
-    pub(crate) fn look_at(&self, volume: &Volume, scene: &mut Scene) -> Result<(), Failure> {
+    /// Leaves one label by --only, and turns the scene's camera to the side of the patient given by --view, and by --azimuth and --elevation.
+    pub(crate) fn choose_view(&self, volume: &Volume, scene: &mut Scene) -> Result<(), Failure> {
+        if let Some(label) = &self.only {
+            *scene = scene.only(label, volume).map_err(|error| Failure::Input(format!("--{error}")))?;
+        }
         self.look_at_side(volume, scene)?;
         let [azimuth, elevation] = [self.azimuth, self.elevation].map(Option::unwrap_or_default);
         if azimuth == 0.0 && elevation == 0.0 {

@@ -3,6 +3,7 @@
 mod classification;
 mod fitting;
 mod label_ids;
+mod only;
 mod refusals;
 
 use std::path::{Path, PathBuf};

@@ -57,9 +57,16 @@ impl VolumeError {
         found: impl Into<String>,
         allowed: impl Into<String>,
     ) -> Self {
-        let [origin, found] = [origin.into(), found.into()].map(|text| without_passwords(&text).into_owned());
-        Self::Invalid { origin, field: field.into(), found, allowed: allowed.into() }
+        invalid_of([origin.into(), field.into(), found.into(), allowed.into()])
     }
+}
+
+/// [`VolumeError::invalid`], compiled once for all kinds of text.
+#[cold]
+#[inline(never)]
+fn invalid_of([origin, field, found, allowed]: [String; 4]) -> VolumeError {
+    let [origin, found] = [origin, found].map(|text| without_passwords(&text).into_owned());
+    VolumeError::Invalid { origin, field, found, allowed }
 }
 
 /// A path as errors tell it: an address without its password.

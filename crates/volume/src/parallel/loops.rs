@@ -3,7 +3,7 @@
 use std::iter::Sum;
 use std::sync::{Mutex, PoisonError};
 
-use super::source::{Enumerate, Exact, FlatMap, Map, Pieces, Source, Zip};
+use super::source::{Enumerate, Exact, FilterMap, FlatMap, IS_ONE, Map, Pieces, Source, Zip};
 use super::{Gathered, IntoLoop, SliceMut as _, current_num_threads, threads};
 
 /// The pieces of a loop for each thread: a thread whose pieces took less time than others' takes over some of theirs.
@@ -45,17 +45,17 @@ impl<S: Source> Loop<S> {
 
     /// The items for which a function holds.
     pub fn filter(self, f: impl Fn(&S::Item) -> bool + Sync) -> Loop<impl Source<Item = S::Item>> {
-        self.flat_map_iter(move |item| f(&item).then_some(item))
+        self.filter_map(move |item| f(&item).then_some(item))
     }
 
-    /// All that a function makes of the items, one after the other: of each item an iterator or an [`Option`].
+    /// All that a function makes of the items, one after the other.
     pub fn flat_map_iter<T: IntoIterator, F: Fn(S::Item) -> T>(self, f: F) -> Loop<FlatMap<S, F>> {
         self.over(|source| FlatMap(source, f))
     }
 
     /// What a function makes of the items, where that is something.
-    pub fn filter_map<T, F: Fn(S::Item) -> Option<T>>(self, f: F) -> Loop<FlatMap<S, F>> {
-        self.flat_map_iter(f)
+    pub fn filter_map<T, F: Fn(S::Item) -> Option<T>>(self, f: F) -> Loop<FilterMap<S, F>> {
+        self.over(|source| FilterMap(source, f))
     }
 
     /// Items with their numbers from 0 on.
@@ -100,7 +100,10 @@ impl<S: Source> Loop<S> {
     where
         S::Item: Send,
     {
-        self.pieces(|part| part.items().fold(start(), |all, item| f(all, item))).into_iter().fold(start(), &f)
+        self.pieces(|part| part.items().fold(start(), |all, item| f(all, item)))
+            .into_iter()
+            .reduce(&f)
+            .unwrap_or_else(start)
     }
 
     /// All items joined into one; `None` if there are none.
@@ -165,6 +168,10 @@ impl<S: Source> Loop<S> {
         let count = (PIECES_PER_THREAD * threads).min(items / least.max(1)).max(items.div_ceil(most));
         let pieces = &Pieces { items, count: if threads == 1 { 1 } else { count.max(1) } };
         let shared = &source.share(pieces);
+        if IS_ONE {
+            // A call through a table would only take bytes.
+            return vec![of(Part { shared, pieces, piece: 0 })];
+        }
         results(pieces.count, &|piece| of(Part { shared, pieces, piece }))
     }
 }
@@ -177,7 +184,7 @@ pub(super) struct Part<'a, S: Source> {
 }
 
 impl<'a, S: Source> Part<'a, S> {
-    #[inline]
+    #[inline(always)]
     pub(super) fn items(self) -> impl Iterator<Item = S::Item> {
         S::part(self.shared, self.pieces, self.piece)
     }

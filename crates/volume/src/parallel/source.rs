@@ -4,6 +4,9 @@ use std::iter::zip;
 use std::ops::Range;
 use std::sync::{Mutex, PoisonError};
 
+/// Whether all loops are one piece: a page has one thread.
+pub(super) const IS_ONE: bool = cfg!(target_arch = "wasm32");
+
 /// How a loop is divided.
 pub struct Pieces {
     pub(super) items: usize,
@@ -13,6 +16,9 @@ pub struct Pieces {
 impl Pieces {
     /// The numbers of a piece's items.
     pub(super) fn range(&self, piece: usize) -> Range<usize> {
+        if IS_ONE {
+            return 0..self.items;
+        }
         let first = |piece: usize| self.items / self.count * piece + piece.min(self.items % self.count);
         first(piece)..first(piece + 1)
     }
@@ -45,16 +51,18 @@ macro_rules! shared {
             type Item = $item;
             type Shared = Self;
 
+            #[inline(always)]
             fn count(&self) -> usize {
                 let $own = self;
                 $count
             }
 
+            #[inline(always)]
             fn share(self, _: &Pieces) -> Self {
                 self
             }
 
-            #[inline]
+            #[inline(always)]
             fn part($own: &Self, pieces: &Pieces, piece: usize) -> impl Iterator<Item = $item> {
                 let $range = pieces.range(piece);
                 $part
@@ -102,6 +110,9 @@ fn take<T>(slots: &Slots<T>, piece: usize) -> T {
 
 /// Unique slices, one for each piece, of `size` items for each of the loop's.
 fn divided<'a, T>(mut items: &'a mut [T], size: usize, pieces: &Pieces) -> Slots<&'a mut [T]> {
+    if IS_ONE {
+        return vec![Mutex::new(Some(items))];
+    }
     let count = items.len();
     let slot = |piece| {
         let range = within(&pieces.range(piece), size, count);
@@ -114,15 +125,17 @@ impl<'a, T: Send> Source for &'a mut [T] {
     type Item = &'a mut T;
     type Shared = Slots<Self>;
 
+    #[inline(always)]
     fn count(&self) -> usize {
         self.len()
     }
 
+    #[inline(always)]
     fn share(self, pieces: &Pieces) -> Slots<Self> {
         divided(self, 1, pieces)
     }
 
-    #[inline]
+    #[inline(always)]
     fn part(slots: &Slots<Self>, _: &Pieces, piece: usize) -> impl Iterator<Item = &'a mut T> {
         take(slots, piece).iter_mut()
     }
@@ -148,15 +161,17 @@ impl<'a, T: Send> Source for ChunksMut<'a, T> {
     type Item = &'a mut [T];
     type Shared = (Slots<&'a mut [T]>, usize);
 
+    #[inline(always)]
     fn count(&self) -> usize {
         self.items.len().div_ceil(self.size)
     }
 
+    #[inline(always)]
     fn share(self, pieces: &Pieces) -> Self::Shared {
         (divided(self.items, self.size, pieces), self.size)
     }
 
-    #[inline]
+    #[inline(always)]
     fn part((slots, size): &Self::Shared, _: &Pieces, piece: usize) -> impl Iterator<Item = &'a mut [T]> {
         take(slots, piece).chunks_mut(*size)
     }
@@ -168,18 +183,23 @@ impl<T: Send> Source for Vec<T> {
     type Item = T;
     type Shared = Slots<Self>;
 
+    #[inline(always)]
     fn count(&self) -> usize {
         self.len()
     }
 
+    #[inline(always)]
     fn share(self, pieces: &Pieces) -> Slots<Self> {
+        if IS_ONE {
+            return vec![Mutex::new(Some(self))];
+        }
         let mut items = self.into_iter();
         (0..pieces.count)
             .map(|piece| Mutex::new(Some(items.by_ref().take(pieces.range(piece).len()).collect())))
             .collect()
     }
 
-    #[inline]
+    #[inline(always)]
     fn part(slots: &Slots<Self>, _: &Pieces, piece: usize) -> impl Iterator<Item = T> {
         take(slots, piece).into_iter()
     }
@@ -194,15 +214,17 @@ impl<S: Exact> Source for Enumerate<S> {
     type Item = (usize, S::Item);
     type Shared = S::Shared;
 
+    #[inline(always)]
     fn count(&self) -> usize {
         self.0.count()
     }
 
+    #[inline(always)]
     fn share(self, pieces: &Pieces) -> S::Shared {
         self.0.share(pieces)
     }
 
-    #[inline]
+    #[inline(always)]
     fn part(shared: &S::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = Self::Item> {
         zip(pieces.range(piece), S::part(shared, pieces, piece))
     }
@@ -217,15 +239,17 @@ impl<A: Exact, B: Exact> Source for Zip<A, B> {
     type Item = (A::Item, B::Item);
     type Shared = (A::Shared, B::Shared);
 
+    #[inline(always)]
     fn count(&self) -> usize {
         self.0.count().min(self.1.count())
     }
 
+    #[inline(always)]
     fn share(self, pieces: &Pieces) -> Self::Shared {
         (self.0.share(pieces), self.1.share(pieces))
     }
 
-    #[inline]
+    #[inline(always)]
     fn part((a, b): &Self::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = Self::Item> {
         zip(A::part(a, pieces, piece), B::part(b, pieces, piece))
     }
@@ -240,21 +264,46 @@ impl<S: Source, T, F: Fn(S::Item) -> T + Sync> Source for Map<S, F> {
     type Item = T;
     type Shared = (S::Shared, F);
 
+    #[inline(always)]
     fn count(&self) -> usize {
         self.0.count()
     }
 
+    #[inline(always)]
     fn share(self, pieces: &Pieces) -> Self::Shared {
         (self.0.share(pieces), self.1)
     }
 
-    #[inline]
+    #[inline(always)]
     fn part((shared, f): &Self::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = T> {
         S::part(shared, pieces, piece).map(move |item| f(item))
     }
 }
 
 impl<S: Exact, T, F: Fn(S::Item) -> T + Sync> Exact for Map<S, F> {}
+
+/// What a function makes of the items, where that is something.
+pub struct FilterMap<S, F>(pub(super) S, pub(super) F);
+
+impl<S: Source, T, F: Fn(S::Item) -> Option<T> + Sync> Source for FilterMap<S, F> {
+    type Item = T;
+    type Shared = (S::Shared, F);
+
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.0.count()
+    }
+
+    #[inline(always)]
+    fn share(self, pieces: &Pieces) -> Self::Shared {
+        (self.0.share(pieces), self.1)
+    }
+
+    #[inline(always)]
+    fn part((shared, f): &Self::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = T> {
+        S::part(shared, pieces, piece).filter_map(move |item| f(item))
+    }
+}
 
 /// All that a function makes of the items, one after the other.
 pub struct FlatMap<S, F>(pub(super) S, pub(super) F);
@@ -263,15 +312,17 @@ impl<S: Source, T: IntoIterator, F: Fn(S::Item) -> T + Sync> Source for FlatMap<
     type Item = T::Item;
     type Shared = (S::Shared, F);
 
+    #[inline(always)]
     fn count(&self) -> usize {
         self.0.count()
     }
 
+    #[inline(always)]
     fn share(self, pieces: &Pieces) -> Self::Shared {
         (self.0.share(pieces), self.1)
     }
 
-    #[inline]
+    #[inline(always)]
     fn part((shared, f): &Self::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = T::Item> {
         S::part(shared, pieces, piece).flat_map(move |item| f(item))
     }

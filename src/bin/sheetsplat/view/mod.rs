@@ -40,7 +40,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     [scene.image.width, scene.image.height] = size.map(u32::from);
     scene = Scene { image, ..arguments.input.choose_levels(&scene, Scene::explicit_all_around)? };
     let volume = arguments.input.load_volume(&scene, &outputs)?;
-    arguments.input.look_at(&volume, &mut scene)?;
+    arguments.input.choose_view(&volume, &mut scene)?;
     scene = scene.fitted(&volume);
     scene.camera = scene.camera_for(&volume);
 
