@@ -35,7 +35,7 @@ impl Scene {
                 return Err(refused("a volume with labels that fits into memory".to_owned()));
             }
             Some(labels) => {
-                let present: BTreeSet<u16> = labels.iter().copied().collect();
+                let present = present(labels.iter().copied());
                 if chosen.is_disjoint(&present) {
                     return Err(refused(allowed(volume, present)));
                 }
@@ -44,7 +44,7 @@ impl Scene {
                 }
             }
             None if is_map() => {
-                let present: BTreeSet<u16> = volume.values().iter().map(|value| value as u16).collect();
+                let present = present(volume.values().iter().filter(|value| !value.is_nan()).map(|value| value as u16));
                 if chosen.is_disjoint(&present) {
                     return Err(refused(allowed(volume, present)));
                 }
@@ -55,6 +55,13 @@ impl Scene {
         }
         Ok(scene)
     }
+}
+
+/// The labels among those of many voxels.
+fn present(labels: impl Iterator<Item = u16>) -> BTreeSet<u16> {
+    let mut is_present = vec![false; 1 << 16];
+    labels.for_each(|label| is_present[usize::from(label)] = true);
+    (0..=u16::MAX).filter(|&label| is_present[usize::from(label)]).collect()
 }
 
 /// The labels of a volume, by name or else by number.

@@ -1,4 +1,4 @@
-//! What a loop's items can be collected into.
+//! Collections of a loop's items.
 
 use super::Loop;
 use super::source::Source;

@@ -12,8 +12,9 @@ const PIECES_PER_THREAD: usize = 8;
 /// A loop over items, with rayon's names.
 pub struct Loop<S> {
     source: S,
-    /// A piece has at least so many items, and at most so many. The first is not kept where the second forbids it.
+    /// The least number of items in a piece, unless that is more than `most`.
     least: usize,
+    /// The greatest number of items in a piece.
     most: usize,
 }
 
@@ -26,13 +27,13 @@ impl<S: Source> Loop<S> {
         Loop { source: of(self.source), least: self.least, most: self.most }
     }
 
-    /// Gives a piece at least so many items, since less work would not pay for a thread.
+    /// Sets the least number of items in a piece, where fewer would not be worth a thread.
     #[must_use]
     pub fn with_min_len(self, least: usize) -> Self {
         Self { least, ..self }
     }
 
-    /// Gives a piece at most so many items, since they take long.
+    /// Sets the greatest number of items in a piece, where each item takes long.
     #[must_use]
     pub fn with_max_len(self, most: usize) -> Self {
         Self { most, ..self }
@@ -48,12 +49,12 @@ impl<S: Source> Loop<S> {
         self.filter_map(move |item| f(&item).then_some(item))
     }
 
-    /// All that a function makes of the items, one after the other.
+    /// The items of a function's results, one after the other.
     pub fn flat_map_iter<T: IntoIterator, F: Fn(S::Item) -> T>(self, f: F) -> Loop<FlatMap<S, F>> {
         self.over(|source| FlatMap(source, f))
     }
 
-    /// What a function makes of the items, where that is something.
+    /// A function's results but for `None`.
     pub fn filter_map<T, F: Fn(S::Item) -> Option<T>>(self, f: F) -> Loop<FilterMap<S, F>> {
         self.over(|source| FilterMap(source, f))
     }
@@ -106,7 +107,7 @@ impl<S: Source> Loop<S> {
             .unwrap_or_else(start)
     }
 
-    /// All items joined into one; `None` if there are none.
+    /// All items joined into one; `None` for a loop without items.
     pub fn reduce_with(self, f: impl Fn(S::Item, S::Item) -> S::Item + Sync) -> Option<S::Item>
     where
         S::Item: Send,
@@ -119,7 +120,7 @@ impl<S: Source> Loop<S> {
         self.pieces(|part| part.items().sum::<T>()).into_iter().sum()
     }
 
-    /// The least item, unless there is none.
+    /// The least item; `None` for a loop without items.
     pub fn min(self) -> Option<S::Item>
     where
         S::Item: Ord + Send,

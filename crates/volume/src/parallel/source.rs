@@ -257,73 +257,45 @@ impl<A: Exact, B: Exact> Source for Zip<A, B> {
 
 impl<A: Exact, B: Exact> Exact for Zip<A, B> {}
 
-/// A function's results.
-pub struct Map<S, F>(pub(super) S, pub(super) F);
+/// A source of what a function makes of another one's items, by a method of iterators.
+macro_rules! adapter {
+    ($(#[$doc:meta])* $name:ident, $method:ident, [$($bound:tt)*] $result:ty => $item:ty) => {
+        $(#[$doc])*
+        pub struct $name<S, F>(pub(super) S, pub(super) F);
 
-impl<S: Source, T, F: Fn(S::Item) -> T + Sync> Source for Map<S, F> {
-    type Item = T;
-    type Shared = (S::Shared, F);
+        impl<S: Source, T $($bound)*, F: Fn(S::Item) -> $result + Sync> Source for $name<S, F> {
+            type Item = $item;
+            type Shared = (S::Shared, F);
 
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.0.count()
-    }
+            #[inline(always)]
+            fn count(&self) -> usize {
+                self.0.count()
+            }
 
-    #[inline(always)]
-    fn share(self, pieces: &Pieces) -> Self::Shared {
-        (self.0.share(pieces), self.1)
-    }
+            #[inline(always)]
+            fn share(self, pieces: &Pieces) -> Self::Shared {
+                (self.0.share(pieces), self.1)
+            }
 
-    #[inline(always)]
-    fn part((shared, f): &Self::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = T> {
-        S::part(shared, pieces, piece).map(move |item| f(item))
-    }
+            #[inline(always)]
+            fn part((shared, f): &Self::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = $item> {
+                S::part(shared, pieces, piece).$method(move |item| f(item))
+            }
+        }
+    };
 }
+
+adapter!(
+    /// A function's results.
+    Map, map, [] T => T
+);
+adapter!(
+    /// A function's results but for `None`.
+    FilterMap, filter_map, [] Option<T> => T
+);
+adapter!(
+    /// The items of a function's results, one after the other.
+    FlatMap, flat_map, [: IntoIterator] T => T::Item
+);
 
 impl<S: Exact, T, F: Fn(S::Item) -> T + Sync> Exact for Map<S, F> {}
-
-/// What a function makes of the items, where that is something.
-pub struct FilterMap<S, F>(pub(super) S, pub(super) F);
-
-impl<S: Source, T, F: Fn(S::Item) -> Option<T> + Sync> Source for FilterMap<S, F> {
-    type Item = T;
-    type Shared = (S::Shared, F);
-
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.0.count()
-    }
-
-    #[inline(always)]
-    fn share(self, pieces: &Pieces) -> Self::Shared {
-        (self.0.share(pieces), self.1)
-    }
-
-    #[inline(always)]
-    fn part((shared, f): &Self::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = T> {
-        S::part(shared, pieces, piece).filter_map(move |item| f(item))
-    }
-}
-
-/// All that a function makes of the items, one after the other.
-pub struct FlatMap<S, F>(pub(super) S, pub(super) F);
-
-impl<S: Source, T: IntoIterator, F: Fn(S::Item) -> T + Sync> Source for FlatMap<S, F> {
-    type Item = T::Item;
-    type Shared = (S::Shared, F);
-
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.0.count()
-    }
-
-    #[inline(always)]
-    fn share(self, pieces: &Pieces) -> Self::Shared {
-        (self.0.share(pieces), self.1)
-    }
-
-    #[inline(always)]
-    fn part((shared, f): &Self::Shared, pieces: &Pieces, piece: usize) -> impl Iterator<Item = T::Item> {
-        S::part(shared, pieces, piece).flat_map(move |item| f(item))
-    }
-}
