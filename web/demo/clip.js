@@ -56,14 +56,20 @@ export class Clip {
             Object.assign(slider, { min: -half, max: half, step: half / 100, value: side });
             this.#tell(slider);
         }
-        const [first, ...further] = planes;
+        // A plane that was switched off stays off, so that none of the others takes its sliders.
+        const isOff = !at("plane").checked && JSON.stringify(planes) === JSON.stringify(this.#further);
+        if (!isOff) this.#take(planes);
+        this.#reflect();
+    }
+
+    /** Gives the first of these planes the sliders. */
+    #take([first, ...further]) {
         this.#further = further;
         at("plane").checked = first !== undefined;
         if (first) {
             const length = Math.hypot(...first.slice(0, 3));
             this.#aim(first.slice(0, 3).map((component) => component / length), -first[3] / length);
         }
-        this.#reflect();
     }
 
     /** Two sliders that cut the volume off along an axis. */

@@ -89,6 +89,7 @@ test("controls that are set back win over the scene", async () => {
     await shown.waitForFunction(async () => !(await window.view.scene()).includes("crop"));
     // The plane without sliders stays; nothing else of the scene does.
     await sceneHas(shown, /^planes = \[\[0\.0, 0\.0, 1\.0, 8\.0\]\]/);
+    assert.ok(!(await shown.isChecked("#plane")));
     // A scene with a table of the camera shows the whole volume.
     await openScene(shown, "volume.builtin = \"head:24\"\nclip.planes = [[0.0, 0.0, 1.0, 8.0]]\ncamera.fit = \"volume\"\n");
     const expected = await picture(shown);
