@@ -66,7 +66,7 @@ use crate::settings::splatting::check_first_hit;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
-use crate::volume::Volume;
+use crate::volume::{Channels, Volume};
 use cut::Surfaces;
 use frame::{Drawing, Host};
 use layer::Layer;
@@ -78,7 +78,7 @@ pub use stream::StreamRenderer;
 pub struct CpuRenderer {
     volume: Arc<Volume>,
     scene: Scene,
-    transfer: TransferFunction,
+    transfer: Channels<TransferFunction>,
     layers: Vec<Layer>,
     simd: Simd,
     level: Level,

@@ -19,14 +19,14 @@ use crate::settings::splatting::check_first_hit;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::Stats;
-use crate::volume::Volume;
+use crate::volume::{Channels, Volume};
 
 /// A view of a volume, drawn in f64 with nothing culled.
 #[derive(Clone, Debug)]
 pub(super) struct ReferenceView {
     volume: Arc<Volume>,
     scene: Scene,
-    transfer: TransferFunction,
+    transfer: Channels<TransferFunction>,
     first_hit: Option<f64>,
     hits: Option<FirstHits>,
     /// Light that is made elsewhere.

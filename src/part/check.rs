@@ -16,7 +16,7 @@ pub(super) const MAX_IMAGES: usize = 256;
 /// part that has one, so that their parts are of one image.
 pub(crate) fn adds_up(volume: &Volume, scene: &Scene) -> bool {
     let joining = Joining::of(scene.splatting.compositing, scene.classification(volume));
-    joining == Some(Joining::Sum) && !volume.further().is_empty()
+    joining == Some(Joining::Sum) && volume.channel_count() > 1
 }
 
 /// Checks that a renderer, which draws all channels at once, can draw parts of a scene.
@@ -43,7 +43,7 @@ pub(crate) fn check_sheets(volume: &Volume, scene: &Scene) -> Result<(), Setting
 /// If the scene's method is not image-aligned, an economy is in use, its compositing has no parts, or the window does not lie in the image.
 pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(), SettingError> {
     let splatting = &scene.splatting;
-    let channels = volume.channels().count();
+    let channels = volume.channel_count();
     if adds_up(volume, scene) && channels > MAX_IMAGES {
         let found = format!("{channels} channels whose images are added up for a part of an image");
         return Err(SettingError::new("volume", found, format!("at most {MAX_IMAGES}")));

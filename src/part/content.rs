@@ -22,7 +22,7 @@ pub struct Content {
 pub struct Extreme {
     /// The value's place in the range of the field's coefficients, from 0 to 1; for `average` the mean value itself.
     pub value: f32,
-    /// [`Self::POINT`] for a point on a plane, and for `average` 1 more for each further one; [`Self::MIDDLE`] for the middle of the visible stretch, which
+    /// [`Self::POINT`] for a point on a plane, and for `average` 1 more for each other one; [`Self::MIDDLE`] for the middle of the visible stretch, which
     /// counts where no plane has a point, and 0 if nothing counted.
     pub counted: f32,
     /// For `average` of a segmented volume with tables of labels, the label of the voxel in the middle of the stretch of the pixel's ray that counts,
@@ -69,13 +69,13 @@ impl Rule {
         if self.has_extremes() {
             let chosen = front.extremes.iter_mut().zip(&back.extremes);
             for ((front, back), (chosen, other)) in front.colors.iter_mut().zip(&back.colors).zip(chosen) {
-                let [points, further] = [*chosen, *other].map(|of| of.counted - Extreme::MIDDLE);
-                if self.compositing == Compositing::Average && points > 0.0 && further > 0.0 {
-                    let share = f64::from(further) / f64::from(points + further);
+                let [points, behind] = [*chosen, *other].map(|of| of.counted - Extreme::MIDDLE);
+                if self.compositing == Compositing::Average && points > 0.0 && behind > 0.0 {
+                    let share = f64::from(behind) / f64::from(points + behind);
                     let mean = |a: f32, b: f32| (f64::from(a) + (f64::from(b) - f64::from(a)) * share) as f32;
                     *front = std::array::from_fn(|channel| mean(front[channel], back[channel]));
                     let value = mean(chosen.value, other.value);
-                    *chosen = Extreme { value, counted: chosen.counted + further, ..*chosen };
+                    *chosen = Extreme { value, counted: chosen.counted + behind, ..*chosen };
                 } else if self.is_better(*other, *chosen) {
                     (*front, *chosen) = (*back, *other);
                 }

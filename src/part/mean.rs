@@ -31,14 +31,14 @@ impl MeanTables {
         }
         let transfer = scene.resolve(volume);
         let of_channel = |(channel, transfer): (&Volume, &TransferFunction)| {
-            let mut transfer = TransferFunction { gradient_opacity: None, further: Vec::new(), ..transfer.clone() };
+            let mut transfer = TransferFunction { gradient_opacity: None, ..transfer.clone() };
             transfer.labels.values_mut().for_each(|tables| tables.gradient_opacity = None);
             if channel.labels().is_none() {
                 transfer.labels = BTreeMap::new();
             }
             Self { transfer, has_colors: channel.colors().is_some() }
         };
-        volume.channels().zip(transfer.channels()).map(of_channel).collect()
+        volume.channels().zip(&transfer).map(of_channel).collect()
     }
 
     /// Whether labels have tables of their own.

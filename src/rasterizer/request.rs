@@ -141,8 +141,7 @@ impl FrameRequest {
         let after = is_after.then(|| After::new((volume, layer), scene, &seen)).transpose()?;
         let integration = after.as_ref().map(|after| Integration { splatting: &splatting, numbers: &after.numbers });
         let first_channel = layer.channels.start;
-        let alone = (first_channel > 0).then(|| volume.transfer().of_channel(first_channel));
-        let transfer = alone.as_ref().unwrap_or_else(|| volume.transfer());
+        let transfer = &volume.transfer()[first_channel..];
         let ramps = Ramps::of_channels(transfer, &stored, first_channel as u32, integration);
         Ok(Self {
             layer: layer.clone(),

@@ -35,12 +35,12 @@ struct Frame {
 impl Frame {
     fn new(
         volume: &Volume,
-        transfer: &TransferFunction,
+        transfer: &[TransferFunction],
         (scene, lights): (&Scene, Option<&Arc<Lights>>),
     ) -> Result<Self, RenderError> {
         // The settings are checked before the camera is framed, which needs valid ones.
         scene.check()?;
-        transfer.check()?;
+        TransferFunction::check_channels(transfer)?;
         let scene = &scene.framed(volume, transfer);
         let geometry = Geometry::new(volume.grid(), scene)?;
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
@@ -62,7 +62,7 @@ impl Frame {
 }
 
 /// See [`super::count`].
-pub(super) fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+pub(super) fn count(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Counts, RenderError> {
     // Counts do not depend on light.
     let frame = Frame::new(volume, transfer, (scene, Some(&Arc::default())))?;
     let buckets = frame.buckets();
@@ -93,7 +93,7 @@ pub(super) fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene)
 pub(super) fn render_for(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     test: Option<Test>,
 ) -> Result<Culled, RenderError> {
@@ -110,7 +110,7 @@ pub(super) fn render_for(
 /// See [`super::part`].
 pub(super) fn part(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     Window { slabs, region }: &Window,
 ) -> Result<Content, RenderError> {

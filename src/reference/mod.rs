@@ -23,6 +23,7 @@ pub mod sheets;
 pub mod splat;
 pub mod visibility;
 
+use std::slice::from_ref;
 use std::sync::Arc;
 
 use crate::error::RenderError;
@@ -52,7 +53,7 @@ pub use visibility::Areas;
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
-pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
+pub fn render(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Image, RenderError> {
     render_culled(volume, transfer, scene, None).map(|culled| culled.image)
 }
 
@@ -60,13 +61,14 @@ pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Re
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
-pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+pub fn count(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Counts, RenderError> {
     let classification = scene.classification(volume);
-    if Joining::of(scene.splatting.compositing, classification).is_some() && !transfer.further.is_empty() {
+    if Joining::of(scene.splatting.compositing, classification).is_some() && transfer.len() > 1 {
         let scene = scene.framed(volume, transfer);
-        let mut all = count(volume, &transfer.of_channel(0), &scene)?;
-        for (number, volume) in (1..=transfer.further.len()).zip(volume.further()) {
-            all.add_channel(&count(volume, &transfer.of_channel(number), &scene)?);
+        let mut counts = channels(volume, transfer).map(|(volume, of)| count(volume, from_ref(of), &scene));
+        let mut all = counts.next().unwrap_or_else(|| Ok(Counts::default()))?;
+        for of_channel in counts {
+            all.add_channel(&of_channel?);
         }
         return Ok(all);
     }
@@ -83,7 +85,7 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
 /// If the scene needs more than can be computed.
 pub fn render_culled(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
@@ -97,7 +99,7 @@ pub fn render_culled(
 pub fn render_for(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
@@ -108,7 +110,7 @@ pub fn render_for(
 fn render_lit(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
@@ -127,13 +129,13 @@ fn render_lit(
 fn render_joined(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     test: Option<visibility::Test>,
     joining: Joining,
 ) -> Result<Culled, RenderError> {
     scene.check()?;
-    transfer.check()?;
+    TransferFunction::check_channels(transfer)?;
     // All channels share a camera.
     let mut scene = scene.framed(volume, transfer);
     let lights = Arc::new(Lights::new(volume, transfer, &scene)?);
@@ -143,8 +145,8 @@ fn render_joined(
         Joining::Nearest => Host { first_hit: Some(host.first_hit.unwrap_or(1.0)), ..host },
     };
     let mut all: Option<Culled> = None;
-    for (number, volume) in volume.channels().enumerate().take(1 + transfer.further.len()) {
-        let channel = render_lit(of_channel, volume, &transfer.of_channel(number), (&scene, Some(&lights)), test)?;
+    for (volume, transfer) in channels(volume, transfer) {
+        let channel = render_lit(of_channel, volume, from_ref(transfer), (&scene, Some(&lights)), test)?;
         let Some(all) = &mut all else {
             all = Some(channel);
             continue;
@@ -169,7 +171,7 @@ fn render_joined(
 /// If the scene needs more than can be computed.
 pub fn part(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     window: &Window,
 ) -> Result<Content, RenderError> {
@@ -182,7 +184,7 @@ pub fn part(
 /// As for [`part`].
 pub fn lit_part(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     window: &Window,
 ) -> Result<Content, RenderError> {

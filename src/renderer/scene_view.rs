@@ -25,6 +25,7 @@ use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{Splatting, check_first_hit};
 use crate::settings::transfer_function::{TransferFunction, check_iso_ranges};
 use crate::settings::window::Window;
+use crate::volume::Channels;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters take effect
 /// with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare). A setter that refuses a value names the field, as reading a
@@ -108,8 +109,12 @@ impl SceneView {
     ///
     /// # Errors
     /// If a setting is invalid; then nothing changes.
-    pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Result<Touched, SettingError> {
-        transfer.check()?;
+    pub fn set_transfer_function(
+        &mut self,
+        transfer: impl Into<Channels<TransferFunction>>,
+    ) -> Result<Touched, SettingError> {
+        let transfer = transfer.into();
+        TransferFunction::check_channels(&transfer)?;
         Ok(self.volume.set_transfer_function(transfer))
     }
 
@@ -223,7 +228,7 @@ impl SceneView {
         let hits = frame.first_hits.as_ref()?;
         let is_inside = pixel[0] < frame.view.size[0] && pixel[1] < frame.view.size[1];
         is_inside.then(|| {
-            let of = (self.volume.volume(), self.volume.transfer());
+            let of = (self.volume.volume(), &**self.volume.transfer());
             PendingPick::record(device, encoder, &hits.texture, pixel, &frame.view, of)
         })
     }

@@ -282,14 +282,14 @@ impl Picked {
 
 /// What decides which volume a scene shows: its channels' volumes with their numbers, without those that are channels of the first one's volume.
 fn sources(scene: &Scene) -> Vec<(usize, Channel)> {
-    let source = |(number, channel): (usize, std::borrow::Cow<'_, Channel>)| {
-        let Channel { volume, spacing, labels, index, time, level, series, .. } = channel.into_owned();
+    let source = |(number, channel): (usize, &Channel)| {
+        let Channel { volume, spacing, labels, index, time, level, series, .. } = channel.clone();
         let mut source = Channel::new(volume);
         (source.spacing, source.labels) = (spacing, labels);
         (source.index, source.time, source.level, source.series) = (index, time, level, series);
         (number == 0 || source.volume != VolumeSource::Memory).then_some((number, source))
     };
-    scene.channels().enumerate().filter_map(source).collect()
+    scene.channels.iter().enumerate().filter_map(source).collect()
 }
 
 /// Plain data as a JavaScript object.

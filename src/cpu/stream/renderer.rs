@@ -35,7 +35,7 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
 use crate::volume::range::range_of;
-use crate::volume::{StoreLevel, StreamedLevel, StreamedVolume, Values, Volume};
+use crate::volume::{Channels, StoreLevel, StreamedLevel, StreamedVolume, Values, Volume};
 
 /// The minimum number of threads that read: a server, or a disk, answers several requests in the time of one.
 const LEAST_READERS: usize = 8;
@@ -53,7 +53,7 @@ pub struct StreamRenderer {
     /// The volume's only values.
     values: StreamedLevel,
     scene: Scene,
-    transfer: TransferFunction,
+    transfer: Channels<TransferFunction>,
     /// The minimum and maximum of the sample's values; `None` if all are holes.
     sampled: Option<[f32; 2]>,
     simd: Simd,
@@ -71,9 +71,9 @@ impl StreamRenderer {
     /// If the store has no such level, or its chunks are too many or too large; if the volume has labels, colours or several channels; or if a setting is not supported: exact interpolation, and methods other than image-aligned.
     pub fn new(volume: StreamedVolume, scene: &Scene) -> Result<Self, RenderError> {
         let Some(values) = volume.only_values().cloned() else {
-            let found = match (&volume.first, volume.further.is_empty()) {
-                (_, false) => "several channels",
-                (first, _) if first.labels.is_some() => "labels",
+            let found = match &*volume.channels {
+                [_, _, ..] => "several channels",
+                [only] if only.labels.is_some() => "labels",
                 _ => "colours",
             };
             let allowed =
@@ -188,7 +188,7 @@ impl StreamRenderer {
                 let nothing = Volume::piece(grid.resized(UVec3::ZERO), Values::default());
                 let (numbers, is_range_known) = self.numbers();
                 let matter = Matter::Streamed { stream: &stream, nothing: &nothing, numbers, is_range_known };
-                let frame = after::Frame::new(0, (matter, &self.transfer), scene, view, host);
+                let frame = after::Frame::new(0, (matter, self.transfer.first()), scene, view, host);
                 let threads = threads.min(self.holders(frame.held_bytes())?);
                 on_threads(threads, || after::Frame::draw(&[frame], self.level))?
             }
@@ -267,8 +267,8 @@ impl StreamRenderer {
                 side,
                 ranges: Ranges::new(StoreLevel { grid, chunk: side }.chunks().element_product()),
                 splats: (splatting.classification == Classification::Before).then(|| Splats {
-                    transfer: self.transfer.clone(),
-                    shown: ValueSet::of_tables(&self.transfer.tables(None)),
+                    transfer: self.transfer.first().clone(),
+                    shown: ValueSet::of_tables(&self.transfer.first().tables(None)),
                     clipped: scene.clip.voxels(&grid, splatting.radius),
                     projection: Projection::new(view, splatting.order, &slabs),
                     support: Kernel::new(splatting.radius, splatting.falloff).support(),
@@ -291,7 +291,7 @@ fn on_threads<R: Send>(threads: usize, draw: impl FnOnce() -> R + Send) -> Resul
 }
 
 /// A scene for a volume's sample with its transfer function, once its classification is known.
-fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFunction), RenderError> {
+fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, Channels<TransferFunction>), RenderError> {
     let sample = &volume.sample;
     scene.check()?;
     scene.check_volume(sample)?;

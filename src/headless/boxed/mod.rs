@@ -129,7 +129,13 @@ impl BoxedView {
             },
             scene,
             headless,
-            range: volume.first.values.range().or_else(|| range_of(volume.sample.values().iter())).unwrap_or([0.0; 2]),
+            range: volume
+                .channels
+                .first()
+                .values
+                .range()
+                .or_else(|| range_of(volume.sample.values().iter()))
+                .unwrap_or([0.0; 2]),
             parts: Vec::new(),
             stats: Stats::default(),
         };
@@ -173,7 +179,7 @@ impl Walk<'_> {
         if self.identity.notes_labels() {
             self.source.chunks().note_labels(&self.scene, &region, &mut content)?;
         }
-        self.parts.push(Part::named(self.identity.clone(), Window { slabs, region }, vec![content]));
+        self.parts.push(Part::named(self.identity.clone(), Window { slabs, region }, content));
         Ok(())
     }
 
@@ -213,10 +219,10 @@ impl Walk<'_> {
         let closed = closed.filter(|closed| closed.contains(&true));
         let Some(content) = self.draw(needed, &window, closed.as_deref())? else { return Ok(None) };
         let part =
-            |slabs, content| Part::named(self.identity.clone(), Window { slabs, ..window.clone() }, vec![content]);
+            |slabs, content: Content| Part::named(self.identity.clone(), Window { slabs, ..window.clone() }, content);
         let start = window.slabs.start;
         let joined = Part::join([part(start - 1..start, front), part(window.slabs.clone(), content)]);
-        Ok(Some(joined.map_err(unmerged)?.content))
+        Ok(joined.map_err(unmerged)?.contents.into_iter().next())
     }
 
     /// Draws a window from the voxels that it needs.
@@ -285,7 +291,7 @@ fn in_range(extremes: &mut [Extreme], own: [f32; 2], all: [f32; 2]) {
 #[cfg_attr(not(feature = "cpu"), expect(unused_variables, reason = "only the native backend refuses settings"))]
 fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(), RenderError> {
     scene.check()?;
-    check_grids((&volume.first, &volume.further))?;
+    check_grids(&volume.channels)?;
     scene.check_volume(&volume.sample)?;
     scene.check_streamed(volume)?;
     StreamedLight::check(volume, scene)?;
@@ -318,11 +324,11 @@ fn side_by_side(parts: Vec<Part>, window: &Window) -> Result<Part, RenderError> 
         if identity.is_none() {
             content = Content::empty(region.pixels(), part.identity.has_extremes());
         }
-        put((&part.content, &part.window.region), (&mut content, region));
+        put((part.contents.first(), &part.window.region), (&mut content, region));
         identity = Some(part.identity);
     }
     let identity = identity.ok_or_else(|| RenderError::Readback("a window has no region".to_owned()))?;
-    Ok(Part::named(identity, window.clone(), vec![content]))
+    Ok(Part::named(identity, window.clone(), content))
 }
 
 /// The pixels of a region within another one.

@@ -44,7 +44,7 @@ struct Reach {
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
-pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+pub fn count(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Counts, RenderError> {
     // Counts do not depend on light.
     Ok(count_in(&Frame::of_channels(Host::default(), volume, transfer, (scene, Some(&Arc::default())))?))
 }

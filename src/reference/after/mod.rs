@@ -33,6 +33,7 @@ use glam::{DVec4, UVec2};
 use super::{Areas, Buffer, Culled, Host, Lights, resolve};
 use crate::error::RenderError;
 use crate::image::channels::Joining;
+use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::part::{Content, Extreme};
 use crate::scene::Scene;
@@ -91,7 +92,7 @@ fn each_place_in<T: Send>(region: &Region, of: impl Fn(UVec2) -> T + Sync) -> Ve
 /// The pixels of a window composited from all channels, row by row.
 fn composite_window(
     host: Host<'_>,
-    (volume, transfer): (&Volume, &TransferFunction),
+    (volume, transfer): (&Volume, &[TransferFunction]),
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     Window { slabs, region }: &Window,
 ) -> Result<Vec<Composited>, RenderError> {
@@ -103,7 +104,7 @@ fn composite_window(
 /// The pixels of a part that shows the nearest of the channels' surfaces (SPEC §10).
 pub(super) fn nearest_part(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     window: &Window,
 ) -> Result<Content, RenderError> {
@@ -112,8 +113,9 @@ pub(super) fn nearest_part(
     let lights = Lights::or_new(lights, volume, transfer, &scene)?;
     let host = Host { first_hit: Some(1.0), ..Host::default() };
     let (mut colors, mut hits) = (vec![[0.0; 4]; window.region.pixels()], vec![f64::INFINITY; window.region.pixels()]);
-    for (number, channel) in volume.channels().enumerate().take(1 + transfer.further.len()) {
-        let pixels = composite_window(host, (channel, &transfer.of_channel(number)), (&scene, Some(&lights)), window)?;
+    for (channel, transfer) in channels(volume, transfer) {
+        let pixels =
+            composite_window(host, (channel, std::slice::from_ref(transfer)), (&scene, Some(&lights)), window)?;
         let own = pixels.iter().map(|pixel| pixel.color.as_vec4().to_array()).collect::<Vec<_>>();
         let own_hits = pixels.iter().map(|pixel| pixel.first_hit.unwrap_or(f64::INFINITY)).collect::<Vec<_>>();
         Joining::Nearest.join((&mut colors, &mut hits), (&own, &own_hits));
@@ -125,7 +127,7 @@ pub(super) fn nearest_part(
 /// See [`super::part`].
 pub(super) fn part(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     window: &Window,
 ) -> Result<Content, RenderError> {
@@ -147,7 +149,7 @@ pub(super) fn part(
 pub fn render_for(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
 ) -> Result<Culled, RenderError> {
     render_lit(host, volume, transfer, (scene, None))
@@ -157,7 +159,7 @@ pub fn render_for(
 pub(super) fn render_lit(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
 ) -> Result<Culled, RenderError> {
     let frames = Frame::of_channels(host, volume, transfer, (scene, lights))?;

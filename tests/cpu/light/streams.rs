@@ -115,7 +115,7 @@ fn a_coarser_level_is_drawn_in_the_light_of_a_finer_one() {
         let expected = |lights| reference::lit_part(&coarse, &transfer, (&scene, lights), &window).unwrap().colors;
         let (whole, own) = (expected(Some(&lights)), expected(None));
         let apart = |other: &[[f32; 4]]| {
-            let differences = part.content.colors.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| {
+            let differences = part.contents[0].colors.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| {
                 assert!(a.is_finite() && b.is_finite());
                 f64::from(a - b).powi(2)
             });
