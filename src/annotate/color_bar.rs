@@ -11,7 +11,7 @@ use crate::SettingError;
 use crate::appearance::{categories, shown_range};
 use crate::image::Image;
 use crate::scene::Scene;
-use crate::settings::{Compositing, TransferFunction};
+use crate::settings::TransferFunction;
 use crate::volume::Volume;
 
 /// The width of a bar, the length of a tick, the distance between a tick and its number, and between two channels' bars, in heights of the font.
@@ -33,14 +33,11 @@ pub(super) fn plate(
     room: u32,
 ) -> Result<Image, SettingError> {
     // Where a pixel shows a single value, its opacity acts as brightness.
-    let is_projection = match scene.splatting.compositing {
-        Compositing::Maximum | Compositing::Minimum => true,
-        Compositing::Xray | Compositing::Average => {
-            let found = "splatting.compositing = \"xray\" or \"average\", which add colours up";
-            return Err(refused("colors", found, "any other compositing"));
-        }
-        _ => false,
-    };
+    let is_projection = scene.splatting.compositing.is_extreme();
+    if scene.splatting.compositing.is_sum() {
+        let found = "splatting.compositing = \"xray\" or \"average\", which add colours up";
+        return Err(refused("colors", found, "any other compositing"));
+    }
     let are_several = volume.channel_count() > 1;
     let height = ((f64::from(room) * SHARE) as u32).max(1);
     let mut bars = Vec::new();

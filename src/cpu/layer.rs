@@ -148,10 +148,7 @@ pub(super) fn draw(layers: &mut [Layer], scene: &Scene, view: ViewGeometry, host
     };
     let mut by_itself = scene.clone();
     by_itself.image.background = [0.0; 4];
-    let first_hit = match joining {
-        Joining::Sum => host.first_hit,
-        Joining::Nearest => host.first_hit.or(Some(1.0)),
-    };
+    let first_hit = joining.first_hit(host.first_hit);
     let draw = |layer: &mut Layer| layer.draw(&by_itself, view, Host { first_hit, ..host.clone() }, level);
     let (first, others) = layers.split_at_mut(1);
     let mut all = draw(&mut first[0]);
@@ -204,7 +201,7 @@ mod tests {
             let list = list_of(&renderer);
             scene.camera = scene.camera.turned(20.0);
             scene.shading.ambient = 0.5;
-            scene.splatting.compositing = crate::settings::splatting::Compositing::Xray;
+            scene.splatting.compositing = crate::appearance::Preset::Xray.compositing();
             scene.splatting.slab_width = 0.5;
             renderer.set_scene(&scene).unwrap();
             renderer.draw().unwrap();

@@ -172,8 +172,8 @@ impl CpuRenderer {
 
     /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
     /// with culling at most [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold); not for
-    /// [`Compositing::Minimum`](crate::settings::Compositing::Minimum), and whatever the value that of the surface for
-    /// [`Compositing::Surface`](crate::settings::Compositing::Surface). See [`Self::first_hits`] and [`Self::pick`].
+    /// `minimum`, and whatever the value that of the surface for
+    /// `surface`. See [`Self::first_hits`] and [`Self::pick`].
     ///
     /// # Errors
     /// If the value is not in (0, 1]; then nothing changes.

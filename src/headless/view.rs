@@ -179,8 +179,8 @@ impl HeadlessView {
     /// Records, for [`Headless::pick`](super::Headless::pick), the depth at which each pixel's opacity reaches a value in (0, 1]; `None` records
     /// no depth. It needs front-to-back order and, with culling, at most
     /// [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold).
-    /// [`Compositing::Minimum`](crate::settings::Compositing::Minimum) has no first hits; for
-    /// [`Compositing::Surface`](crate::settings::Compositing::Surface) the depth is the surface's, whatever the value.
+    /// `minimum` has no first hits; for
+    /// `surface` the depth is the surface's, whatever the value.
     ///
     /// # Errors
     /// If the value is not in (0, 1], or the volume is read while it is drawn; then nothing changes.

@@ -60,8 +60,7 @@ pub(super) struct Rule {
 impl Rule {
     /// Whether pixels carry extremes.
     pub(super) fn has_extremes(self) -> bool {
-        let is_choice = matches!(self.compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average);
-        is_choice && self.classification == Classification::After
+        self.compositing.chooses_values(self.classification)
     }
 
     /// Merges the slabs behind some slabs into them.
@@ -70,7 +69,7 @@ impl Rule {
             let chosen = front.extremes.iter_mut().zip(&back.extremes);
             for ((front, back), (chosen, other)) in front.colors.iter_mut().zip(&back.colors).zip(chosen) {
                 let [points, behind] = [*chosen, *other].map(|of| of.counted - Extreme::MIDDLE);
-                if self.compositing == Compositing::Average && points > 0.0 && behind > 0.0 {
+                if self.compositing.is_average() && points > 0.0 && behind > 0.0 {
                     let share = f64::from(behind) / f64::from(points + behind);
                     let mean = |a: f32, b: f32| (f64::from(a) + (f64::from(b) - f64::from(a)) * share) as f32;
                     *front = std::array::from_fn(|channel| mean(front[channel], back[channel]));
@@ -90,9 +89,9 @@ impl Rule {
         if other.counted != chosen.counted {
             return other.counted > chosen.counted;
         }
-        match self.compositing {
-            Compositing::Minimum => other.value < chosen.value - HAIR_OF_RANGE,
-            _ => other.value > chosen.value + HAIR_OF_RANGE,
+        match self.compositing.keeps_least() {
+            true => other.value < chosen.value - HAIR_OF_RANGE,
+            false => other.value > chosen.value + HAIR_OF_RANGE,
         }
     }
 

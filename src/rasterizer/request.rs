@@ -132,8 +132,7 @@ impl FrameRequest {
         let rays = RayMode { cut: is_cut, first_hit: first_hit.is_some() };
         let drawn = window.map_or_else(|| Window::whole(size), |window| window.opened(&seen.slabs_of(grid)));
         splatting.check_rays(rays.cut, first_hit)?;
-        // The nearest surface is the one with the nearest first hit, for any opacity.
-        let first_hit = first_hit.or((joining == Some(Joining::Nearest)).then_some(1.0));
+        let first_hit = joining.map_or(first_hit, |joining| joining.first_hit(first_hit));
         let rays = RayMode { first_hit: first_hit.is_some(), ..rays };
         check_hits(device, rays, size)?;
         let surfaces = hiding.map(|hiding| hiding.depths(&seen, grid)).transpose()?;

@@ -140,10 +140,7 @@ fn render_joined(
     let mut scene = scene.framed(volume, transfer);
     let lights = Arc::new(Lights::new(volume, transfer, &scene)?);
     let background = std::mem::replace(&mut scene.image.background, [0.0; 4]);
-    let of_channel = match joining {
-        Joining::Sum => host,
-        Joining::Nearest => Host { first_hit: Some(host.first_hit.unwrap_or(1.0)), ..host },
-    };
+    let of_channel = Host { first_hit: joining.first_hit(host.first_hit), ..host };
     let mut all: Option<Culled> = None;
     for (volume, transfer) in channels(volume, transfer) {
         let channel = render_lit(of_channel, volume, from_ref(transfer), (&scene, Some(&lights)), test)?;

@@ -202,8 +202,8 @@ impl SceneView {
     }
 
     /// Requests the depth at which every pixel's opacity reaches a value above 0 and at most 1, or nothing with `None`. Front to back only, and
-    /// with culling at most [`Splatting::opacity_threshold`]. Not for [`Compositing::Minimum`](crate::settings::splatting::Compositing::Minimum);
-    /// for [`Compositing::Surface`](crate::settings::splatting::Compositing::Surface) it is the surface's depth for any value. See
+    /// with culling at most [`Splatting::opacity_threshold`]. Not for `minimum`;
+    /// for `surface` it is the surface's depth for any value. See
     /// [`Self::first_hits`] and [`Self::pick`].
     ///
     /// # Errors

@@ -166,17 +166,7 @@ fn projection_name(camera: &Camera) -> &'static str {
 }
 
 fn compositing_name(compositing: Compositing) -> &'static str {
-    match compositing {
-        Compositing::Linear => "linear",
-        Compositing::Exponential => "exponential",
-        Compositing::Xray => "xray",
-        Compositing::Maximum => "maximum",
-        Compositing::Minimum => "minimum",
-        Compositing::Average => "average",
-        Compositing::Surface => "surface",
-        // One that this file does not know yet; the page shows it as the preset's.
-        _ => "",
-    }
+    name_of(&Compositing::ALL, compositing).unwrap_or_default()
 }
 
 fn name_of<T: PartialEq>(names: &[(&'static str, T)], wanted: T) -> Option<&'static str> {

@@ -32,7 +32,6 @@ use crate::part::{self, Content, Extreme, Identity, MergeError, Part};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
 use crate::volume::range::range_of;
@@ -238,7 +237,7 @@ impl Walk<'_> {
             return Ok(None);
         };
         // Means are noted as they are.
-        let is_choice = self.identity.has_extremes() && self.scene.splatting.compositing != Compositing::Average;
+        let is_choice = self.identity.has_extremes() && !self.scene.splatting.compositing.is_average();
         if let Some(range) = range.filter(|_| is_choice) {
             in_range(&mut content.extremes, range, self.range);
         }
@@ -251,13 +250,15 @@ impl Walk<'_> {
 
     /// For each pixel whether anything can be seen behind it; `None` if nothing hides what lies behind it.
     fn open_pixels(&self, content: &Content) -> Option<Vec<bool>> {
-        let opaque = opaque_from(&self.scene.splatting)?;
+        let opaque = self.scene.splatting.culls_from()? as f32;
         Some(content.colors.iter().map(|color| color[3] < opaque).collect())
     }
 
     /// The smallest box of a region's pixels behind which anything can be seen; `None` if there is no such pixel.
     fn open_box(&self, content: &Content, region: &Region) -> Option<Region> {
-        let Some(opaque) = opaque_from(&self.scene.splatting) else { return Some(*region) };
+        let Some(opaque) = self.scene.splatting.culls_from().map(|opacity| opacity as f32) else {
+            return Some(*region);
+        };
         let (mut low, mut high) = ([u32::MAX; 2], [0; 2]);
         for (color, at) in content.colors.iter().zip(0..).filter(|(color, _)| color[3] < opaque) {
             debug_assert!(color[3].is_finite());
@@ -269,13 +270,6 @@ impl Walk<'_> {
         let [width, height] = [0, 1].map(|axis| (high[axis] + 1).saturating_sub(low[axis]));
         (width > 0).then(|| Region { x: region.x + low[0], y: region.y + low[1], width, height })
     }
-}
-
-/// The opacity from which nothing behind a pixel can be seen, if there is one.
-fn opaque_from(splatting: &Splatting) -> Option<f32> {
-    let Splatting { compositing, culling, order, opacity_threshold, .. } = *splatting;
-    let enough = if compositing == Compositing::Surface { 1.0 } else { opacity_threshold as f32 };
-    (compositing.hides() && culling && order == Order::FrontToBack).then_some(enough)
 }
 
 /// Converts values that pixels chose, places in the range of a box's values, into places in the range of all.

@@ -37,7 +37,7 @@ use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::part::{Content, Extreme};
 use crate::scene::Scene;
-use crate::settings::splatting::Compositing;
+use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::volume::Volume;
@@ -133,12 +133,11 @@ pub(super) fn part(
 ) -> Result<Content, RenderError> {
     let pixels = composite_window(Host::default(), (volume, transfer), (scene, lights), window)?;
     let compositing = scene.splatting.compositing;
-    let is_mean = |pixel: &Composited| compositing == Compositing::Average && pixel.extreme.counted > Extreme::MIDDLE;
+    let is_mean = |pixel: &Composited| compositing.is_average() && pixel.extreme.counted > Extreme::MIDDLE;
     // Means are classified where parts are merged.
     let color = |pixel: &Composited| if is_mean(pixel) { pixel.own.unwrap_or_default() } else { pixel.color };
     let colors = pixels.iter().map(|pixel| color(pixel).as_vec4().to_array()).collect();
-    let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average);
-    let extremes = pixels.iter().filter(|_| is_choice).map(|pixel| pixel.extreme).collect();
+    let extremes = pixels.iter().filter(|_| compositing.is_choice()).map(|pixel| pixel.extreme).collect();
     Ok(Content { colors, extremes })
 }
 
@@ -165,11 +164,7 @@ pub(super) fn render_lit(
     let frames = Frame::of_channels(host, volume, transfer, (scene, lights))?;
     let pixels = composite(&frames, &Region::whole([scene.image.width, scene.image.height]));
     let acc = Buffer { width: scene.image.width as usize, pixels: pixels.iter().map(|pixel| pixel.color).collect() };
-    // Sums are clamped; the other modes already give premultiplied RGBA.
-    let resolved_as = match scene.splatting.compositing {
-        Compositing::Xray => Compositing::Xray,
-        _ => Compositing::Linear,
-    };
+    let resolved_as = scene.splatting.compositing.finished_as(Classification::After);
     let image = resolve::resolve(&acc, (resolved_as, &scene.splatting), scene.image.background).into_image();
     let depth = |(at, pixel): (usize, &Composited)| {
         let at = UVec2::new((at % acc.width) as u32, (at / acc.width) as u32);
