@@ -9,6 +9,7 @@ use super::after::Coefficients;
 use super::frame::{Drawing, Host, Reused, Voxels};
 use super::material::Materials;
 use crate::error::RenderError;
+use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
@@ -107,14 +108,13 @@ impl List {
 /// How the layers' images become one; `None` if there is one layer of all channels.
 fn joining(volume: &Volume, scene: &Scene) -> Option<Joining> {
     let splatting = &scene.splatting;
-    Joining::of(splatting.compositing, splatting.classification).filter(|_| volume.channel_count() > 1)
+    Joining::of_channels(volume.channel_count(), splatting.compositing, splatting.classification)
 }
 
 /// The layers of a scene whose classification is known.
 pub(super) fn layers(
     volume: &Arc<Volume>,
-    transfer: &[TransferFunction],
-    scene: &Scene,
+    FinishedScene { scene, transfer }: &FinishedScene,
 ) -> Result<Vec<Layer>, RenderError> {
     if joining(volume, scene).is_none() {
         return Ok(vec![Layer::new(volume, transfer, scene)?]);
@@ -126,15 +126,16 @@ pub(super) fn layers(
 /// Computes again what a change of the scene makes obsolete.
 pub(super) fn update(
     layers: &mut Vec<Layer>,
-    (volume, transfer): (&Arc<Volume>, &[TransferFunction]),
-    (old, new): (&Scene, &Scene),
+    volume: &Arc<Volume>,
+    (old, new): (&FinishedScene, &FinishedScene),
 ) -> Result<(), RenderError> {
-    match joining(volume, new) {
-        joined if joined.is_some() != joining(volume, old).is_some() => *layers = self::layers(volume, transfer, new)?,
-        None => layers[0].update(transfer, (old, new))?,
+    let scenes = (&old.scene, &new.scene);
+    match joining(volume, scenes.1) {
+        joined if joined.is_some() != joining(volume, scenes.0).is_some() => *layers = self::layers(volume, new)?,
+        None => layers[0].update(&new.transfer, scenes)?,
         Some(_) => {
-            for (layer, transfer) in layers.iter_mut().zip(transfer) {
-                layer.update(std::slice::from_ref(transfer), (old, new))?;
+            for (layer, transfer) in layers.iter_mut().zip(&new.transfer) {
+                layer.update(std::slice::from_ref(transfer), scenes)?;
             }
         }
     }

@@ -15,6 +15,11 @@ pub(crate) enum Joining {
 }
 
 impl Joining {
+    /// For some channels; `None` where they share sheets, or there is one.
+    pub(crate) fn of_channels(count: usize, compositing: Compositing, classification: Classification) -> Option<Self> {
+        Self::of(compositing, classification).filter(|_| count > 1)
+    }
+
     /// `None` where channels share sheets.
     pub(crate) fn of(compositing: Compositing, classification: Classification) -> Option<Self> {
         let has_surface = compositing.has_surface() && classification == Classification::After;

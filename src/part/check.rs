@@ -15,8 +15,8 @@ pub(super) const MAX_IMAGES: usize = 256;
 /// Whether each of a volume's channels has an image of its own, and these are added up. Of surfaces the nearest is shown, which is also that of the nearest
 /// part that has one, so that their parts are of one image.
 pub(crate) fn adds_up(volume: &Volume, scene: &Scene) -> bool {
-    let joining = Joining::of(scene.splatting.compositing, scene.classification(volume));
-    joining == Some(Joining::Sum) && volume.channel_count() > 1
+    let (count, compositing) = (volume.channel_count(), scene.splatting.compositing);
+    Joining::of_channels(count, compositing, scene.classification(volume)) == Some(Joining::Sum)
 }
 
 /// Checks that a renderer, which draws all channels at once, can draw parts of a scene.

@@ -120,7 +120,6 @@ impl FrameRequest {
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
         let splatting = scene.splatting;
-        splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let stored = volume.stored(layer);

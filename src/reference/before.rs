@@ -38,10 +38,7 @@ impl Frame {
         transfer: &[TransferFunction],
         (scene, lights): (&Scene, Option<&Arc<Lights>>),
     ) -> Result<Self, RenderError> {
-        // The settings are checked before the camera is framed, which needs valid ones.
-        scene.check()?;
-        TransferFunction::check_channels(transfer)?;
-        let scene = &scene.framed(volume, transfer);
+        let scene = &super::framed(volume, transfer, scene)?;
         let geometry = Geometry::new(volume.grid(), scene)?;
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let voxels = shading::taking_part(volume, transfer, &geometry);

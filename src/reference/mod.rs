@@ -63,7 +63,7 @@ pub fn render(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> 
 /// If the scene needs more than can be computed.
 pub fn count(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Counts, RenderError> {
     let classification = scene.classification(volume);
-    if Joining::of(scene.splatting.compositing, classification).is_some() && transfer.len() > 1 {
+    if joining(volume, transfer, scene).is_some() {
         let scene = scene.framed(volume, transfer);
         let mut counts = channels(volume, transfer).map(|(volume, of)| count(volume, from_ref(of), &scene));
         let mut all = counts.next().unwrap_or_else(|| Ok(Counts::default()))?;
@@ -115,14 +115,26 @@ fn render_lit(
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
     let classification = scene.classification(volume);
-    let joining = Joining::of(scene.splatting.compositing, classification);
-    if let Some(joining) = joining.filter(|_| channels(volume, transfer).nth(1).is_some()) {
+    if let Some(joining) = joining(volume, transfer, scene) {
         return render_joined(host, volume, transfer, scene, test, joining);
     }
     if classification == Classification::After {
         return after::render_lit(host, volume, transfer, (scene, lights));
     }
     before::render_for(host, volume, transfer, (scene, lights), test)
+}
+
+/// How the images of the channels that are drawn become one; `None` if they share sheets, or there is one.
+fn joining(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Option<Joining> {
+    let (count, compositing) = (channels(volume, transfer).count(), scene.splatting.compositing);
+    Joining::of_channels(count, compositing, scene.classification(volume))
+}
+
+/// A scene with its camera's frame. The settings are checked first, because framing needs valid ones.
+fn framed(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Scene, SettingError> {
+    scene.check()?;
+    TransferFunction::check_channels(transfer)?;
+    Ok(scene.framed(volume, transfer))
 }
 
 /// Renders every channel by itself, and joins the images (SPEC §10).
@@ -134,10 +146,8 @@ fn render_joined(
     test: Option<visibility::Test>,
     joining: Joining,
 ) -> Result<Culled, RenderError> {
-    scene.check()?;
-    TransferFunction::check_channels(transfer)?;
     // All channels share a camera.
-    let mut scene = scene.framed(volume, transfer);
+    let mut scene = framed(volume, transfer, scene)?;
     let lights = Arc::new(Lights::new(volume, transfer, &scene)?);
     let background = std::mem::replace(&mut scene.image.background, [0.0; 4]);
     let of_channel = Host { first_hit: joining.first_hit(host.first_hit), ..host };
@@ -186,8 +196,7 @@ pub fn lit_part(
     window: &Window,
 ) -> Result<Content, RenderError> {
     let classification = scene.classification(volume);
-    let joining = Joining::of(scene.splatting.compositing, classification);
-    if joining == Some(Joining::Nearest) && channels(volume, transfer).nth(1).is_some() {
+    if joining(volume, transfer, scene) == Some(Joining::Nearest) {
         return after::nearest_part(volume, transfer, (scene, lights), window);
     }
     if classification == Classification::After {

@@ -6,6 +6,7 @@ use wgpu::{CommandEncoder, Device, Texture};
 
 use crate::error::setting::{Interval, SettingError};
 use crate::error::{RenderError, check_device};
+use crate::finished::FinishedScene;
 use crate::geometry::surfaces::Surfaces;
 use crate::gpu::classified_volume::{ClassifiedVolume, Touched};
 use crate::gpu::counts::PendingCounts;
@@ -55,10 +56,7 @@ impl SceneView {
     /// another device; or if the device fails.
     pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
         check_device(device, volume.device(), "the volume")?;
-        scene.check()?;
-        scene.check_volume(volume.volume())?;
-        let scene = scene.settled(volume.volume());
-        let transfer = scene.resolve(volume.volume());
+        let FinishedScene { scene, transfer } = FinishedScene::new(volume.volume(), scene)?;
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
         let splatting = &scene.splatting;
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, splatting))?;

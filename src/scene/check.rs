@@ -86,15 +86,29 @@ impl Scene {
         if let Some(spacing) = self.channels.first().spacing {
             check_spacing("volume.spacing", spacing)?;
         }
-        self.camera.check()?;
-        self.image.check()?;
-        self.clip.check()?;
+        self.check_tables()?;
         for (number, channel) in self.channels.iter().enumerate() {
             channel.transfer.check_as(&self.transfer_table(number))?;
         }
         self.check_pieces()?;
+        self.check_membership()
+    }
+
+    /// [`Self::check`], and that a volume has what the scene needs ([`Self::check_volume`]).
+    ///
+    /// # Errors
+    /// As for these.
+    pub fn check_for(&self, volume: &Volume) -> Result<(), SettingError> {
+        self.check()?;
+        self.check_volume(volume)
+    }
+
+    /// Checks the settings of all tables but those of channels.
+    pub(super) fn check_tables(&self) -> Result<(), SettingError> {
+        self.camera.check()?;
+        self.image.check()?;
+        self.clip.check()?;
         self.shading.check()?;
-        self.check_membership()?;
         self.splatting.check()
     }
 

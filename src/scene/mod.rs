@@ -333,6 +333,7 @@ impl Scene {
             splatting: tables::splatting(splatting, splatting_of_preset)?,
             fitting,
         };
+        scene.check_tables().map_err(|error| origins.refused(error))?;
         let whole = |error: SettingError| origins.invalid(&error.key, &[], error.found.to_string(), error.allowed);
         scene.check_membership().map_err(whole)?;
         if preset == Some(Preset::Labels) && scene.splatting.classification == Classification::After {

@@ -117,7 +117,10 @@ const FIELDS: &[Field] = &[
     field(
         "transfer.label[0].opacity[0][1]",
         |scene, x| {
-            _ = scene.channels[0].transfer.labels.insert(0, LabelTables { opacity: share(x), ..LabelTables::default() })
+            _ = scene.channels[0]
+                .transfer
+                .labels
+                .insert(0, LabelTables { opacity: share(x), ..LabelTables::default() });
         },
         &[0.0, 1.0],
         SHARE,

@@ -218,7 +218,7 @@ impl Session {
     ) -> Result<(), JsValue> {
         let [width, height] = self.size;
         let scene = Scene { image: ImageSettings { width, height, ..scene.image }, ..scene };
-        scene.check().map_err(error)?;
+        scene.check_for(&volume).map_err(error)?;
         let (camera, home, object) = kept.unwrap_or_else(|| {
             let object = self.all_around.then(|| scene.sphere(&volume, &scene.resolve(&volume))).flatten();
             let camera = scene.camera_for(&volume);

@@ -25,6 +25,7 @@ use super::timed::milliseconds_since;
 use super::{Headless, joined};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
+use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::light::StreamedLight;
@@ -34,8 +35,8 @@ use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
+use crate::volume::StreamedVolume;
 use crate::volume::range::range_of;
-use crate::volume::{StreamedVolume, check_grids};
 pub(super) use channel::opaque_values;
 use source::{Needed, Source};
 
@@ -43,7 +44,7 @@ use source::{Needed, Source};
 #[derive(Clone, Debug)]
 pub(super) struct BoxedView {
     volume: StreamedVolume,
-    scene: Scene,
+    finished: FinishedScene,
     /// What draws the boxes.
     backend: Backend,
     light: StreamedLight,
@@ -55,10 +56,8 @@ impl BoxedView {
     /// # Errors
     /// If a setting of the scene is invalid, or not supported for a volume that is streamed.
     pub(super) fn new(volume: StreamedVolume, scene: &Scene, backend: Backend) -> Result<Self, RenderError> {
-        check(&volume, scene, backend)?;
-        let mut scene = scene.settled(&volume.sample);
-        scene.splatting = scene.splatting.streamed();
-        Ok(Self { volume, scene, backend, light: StreamedLight::default(), given: None })
+        let finished = finished(&volume, scene, backend)?;
+        Ok(Self { volume, finished, backend, light: StreamedLight::default(), given: None })
     }
 
     pub(super) fn backend(&self) -> Backend {
@@ -75,30 +74,25 @@ impl BoxedView {
     }
 
     pub(super) fn scene(&self) -> &Scene {
-        &self.scene
+        &self.finished.scene
     }
 
     pub(super) fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        check(&self.volume, scene, self.backend)?;
-        self.scene = scene.settled(&self.volume.sample);
-        self.scene.splatting = self.scene.splatting.streamed();
+        self.finished = finished(&self.volume, scene, self.backend)?;
         Ok(())
     }
 
     pub(super) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
-        camera.check()?;
-        self.scene.camera = camera;
-        Ok(())
+        self.finished.set_camera(camera)
     }
 
     /// Draws a frame.
     pub(super) fn draw(&self, headless: &Headless) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        if part::adds_up(&self.volume.sample, &self.scene) {
-            return joined::draw((&self.volume, &self.scene), self.given.as_ref(), headless);
+        if part::adds_up(&self.volume.sample, self.scene()) {
+            return joined::draw((&self.volume, self.scene()), self.given.as_ref(), headless);
         }
-        let size = [self.scene.image.width, self.scene.image.height];
-        let (parts, stats) = self.parts(&Window::whole(size), headless)?;
+        let (parts, stats) = self.parts(&Window::whole(self.finished.size()), headless)?;
         let image = Image::merge(parts).map_err(unmerged)?;
         Ok(Rendering { image, stats: Stats { frame_ms: milliseconds_since(start), ..stats } })
     }
@@ -113,11 +107,10 @@ impl BoxedView {
 
     /// The parts of a window, one for each region.
     fn parts(&self, window: &Window, headless: &Headless) -> Result<(Vec<Part>, Stats), RenderError> {
-        let Self { volume, scene, backend, .. } = self;
-        part::check(&volume.sample, scene, window)?;
-        let scene = scene.explicit(&volume.sample);
-        let view =
-            ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height])?;
+        let Self { volume, finished, backend, .. } = self;
+        part::check(&volume.sample, self.scene(), window)?;
+        let scene = finished.scene.explicit(&volume.sample);
+        let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, finished.size())?;
         let mut walk = Walk {
             identity: Identity::of((&volume.clone().into(), &scene), &view)?,
             slabs: window.within(&view.slabs_of(volume.grid())),
@@ -281,19 +274,15 @@ fn in_range(extremes: &mut [Extreme], own: [f32; 2], all: [f32; 2]) {
     }
 }
 
-/// Checks that a scene can be drawn box by box by a backend.
+/// The scene that a volume is drawn in box by box by a backend.
 #[cfg_attr(not(feature = "cpu"), expect(unused_variables, reason = "only the native backend refuses settings"))]
-fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(), RenderError> {
-    scene.check()?;
-    check_grids(&volume.channels)?;
-    scene.check_volume(&volume.sample)?;
-    scene.check_streamed(volume)?;
-    StreamedLight::check(volume, scene)?;
+fn finished(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<FinishedScene, RenderError> {
+    let finished = FinishedScene::streamed(volume, scene)?;
     #[cfg(feature = "cpu")]
     if backend == Backend::Cpu {
         crate::cpu::check(scene)?;
     }
-    Ok(())
+    Ok(finished)
 }
 
 /// The squares of some side, or what is left of them, that cover a region.

@@ -10,6 +10,7 @@ use super::low_pass::LowPass;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::lists::classify::channels;
+use crate::reference::framed;
 use crate::reference::{Geometry, Host, Lights};
 use crate::scene::Scene;
 use crate::settings::transfer_function::TransferFunction;
@@ -56,10 +57,8 @@ impl<'a> Frame<'a> {
         transfer: &'a [TransferFunction],
         (scene, lights): (&Scene, Option<&Arc<Lights>>),
     ) -> Result<Vec<Self>, RenderError> {
-        scene.check()?;
-        TransferFunction::check_channels(transfer)?;
-        host.check(scene)?;
-        let scene = scene.framed(volume, transfer);
+        let scene = framed(volume, transfer, scene)?;
+        host.check(&scene)?;
         let of = (Lights::or_new(lights, volume, transfer, &scene)?, scene);
         let frame = |(volume, transfer)| Self::of_channel(host, volume, transfer, (of.1.clone(), of.0.clone()));
         channels(volume, transfer).map(frame).collect()

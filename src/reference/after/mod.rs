@@ -141,20 +141,11 @@ pub(super) fn part(
     Ok(Content { colors, extremes })
 }
 
-/// Renders a scene as [`super::render_for`] does. Nothing is culled, and the order of compositing does not matter.
+/// Renders a scene as [`super::render_for`] does. Nothing is culled, and the order of compositing does not matter. `lights` are those of all channels, where one
+/// of them is drawn by itself.
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
-pub fn render_for(
-    host: Host<'_>,
-    volume: &Volume,
-    transfer: &[TransferFunction],
-    scene: &Scene,
-) -> Result<Culled, RenderError> {
-    render_lit(host, volume, transfer, (scene, None))
-}
-
-/// [`render_for`]; `lights` are those of all channels, where one of them is drawn by itself.
 pub(super) fn render_lit(
     host: Host<'_>,
     volume: &Volume,
