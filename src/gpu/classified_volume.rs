@@ -458,7 +458,7 @@ impl Touched {
 /// Drops the tables of labels of channels without labels, and the transfer functions of channels that a volume does not have.
 fn keep_what_applies(volume: &Volume, transfer: &mut Channels<TransferFunction>) {
     transfer.truncate(volume.channel_count());
-    for (channel, transfer) in volume.channels().zip(transfer) {
+    for (channel, transfer) in volume.channels().zip(transfer.iter_mut()) {
         if channel.labels().is_none() {
             transfer.labels.clear();
         }

@@ -87,7 +87,7 @@ impl ReferenceView {
         let Self { volume, finished: FinishedScene { scene, transfer }, .. } = self;
         let (_, view) = self.finished.framed(volume, volume.grid())?;
         let opened = window.opened(&view.slabs_of(volume.grid()));
-        let content = reference::lit_part(volume, transfer, (scene, self.light.as_ref()), &opened)?;
+        let content = reference::part(volume, transfer, (scene, self.light.as_ref()), &opened)?;
         Ok((content, view, self.stats(start)?))
     }
 

@@ -50,69 +50,58 @@ impl Content {
     }
 }
 
-/// The rule by which consecutive slab ranges merge.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rule {
-    pub(super) compositing: Compositing,
-    pub(super) classification: Classification,
-}
-
-impl Rule {
-    /// Whether pixels carry extremes.
-    pub(super) fn has_extremes(self) -> bool {
-        self.compositing.chooses_values(self.classification)
-    }
-
+impl Content {
     /// Merges the slabs behind some slabs into them.
-    pub(super) fn merge(self, front: &mut Content, back: &Content) {
-        if self.has_extremes() {
-            let chosen = front.extremes.iter_mut().zip(&back.extremes);
-            for ((front, back), (chosen, other)) in front.colors.iter_mut().zip(&back.colors).zip(chosen) {
+    pub(super) fn merge(&mut self, back: &Self, (compositing, classification): (Compositing, Classification)) {
+        let colors = self.colors.iter_mut().zip(&back.colors);
+        if compositing.chooses_values(classification) {
+            for ((front, back), (chosen, other)) in colors.zip(self.extremes.iter_mut().zip(&back.extremes)) {
                 let [points, behind] = [*chosen, *other].map(|of| of.counted - Extreme::MIDDLE);
-                if self.compositing.is_average() && points > 0.0 && behind > 0.0 {
+                if compositing.is_average() && points > 0.0 && behind > 0.0 {
                     let share = f64::from(behind) / f64::from(points + behind);
                     let mean = |a: f32, b: f32| (f64::from(a) + (f64::from(b) - f64::from(a)) * share) as f32;
                     *front = std::array::from_fn(|channel| mean(front[channel], back[channel]));
                     let value = mean(chosen.value, other.value);
                     *chosen = Extreme { value, counted: chosen.counted + behind, ..*chosen };
-                } else if self.is_better(*other, *chosen) {
+                } else if is_better(compositing, *other, *chosen) {
                     (*front, *chosen) = (*back, *other);
                 }
             }
             return;
         }
-        front.colors.iter_mut().zip(&back.colors).for_each(|(front, back)| *front = self.pixel(*front, *back));
+        colors.for_each(|(front, back)| *front = pixel(compositing, *front, *back));
     }
+}
 
-    /// Whether a value replaces a nearer one.
-    fn is_better(self, other: Extreme, chosen: Extreme) -> bool {
-        if other.counted != chosen.counted {
-            return other.counted > chosen.counted;
-        }
-        match self.compositing.keeps_least() {
-            true => other.value < chosen.value - HAIR_OF_RANGE,
-            false => other.value > chosen.value + HAIR_OF_RANGE,
-        }
+/// Whether a value replaces a nearer one.
+fn is_better(compositing: Compositing, other: Extreme, chosen: Extreme) -> bool {
+    if other.counted != chosen.counted {
+        return other.counted > chosen.counted;
     }
+    match compositing.keeps_least() {
+        true => other.value < chosen.value - HAIR_OF_RANGE,
+        false => other.value > chosen.value + HAIR_OF_RANGE,
+    }
+}
 
-    fn pixel(self, front: [f32; 4], back: [f32; 4]) -> [f32; 4] {
-        match self.compositing {
-            Compositing::Linear | Compositing::Exponential => {
-                // Opacity beyond 1 is a rounding error and must not hide another part.
-                let rest = (1.0 - front[3]).max(0.0);
-                std::array::from_fn(|channel| front[channel] + rest * back[channel])
-            }
-            Compositing::Xray | Compositing::Average => std::array::from_fn(|channel| front[channel] + back[channel]),
-            // The nearest of equal ones.
-            Compositing::Maximum | Compositing::Minimum => {
-                if back[3] > front[3] {
-                    back
-                } else {
-                    front
-                }
-            }
-            Compositing::Surface if front[3] >= 1.0 => front,
-            Compositing::Surface => back,
+/// A pixel of two consecutive slab ranges.
+fn pixel(compositing: Compositing, front: [f32; 4], back: [f32; 4]) -> [f32; 4] {
+    match compositing {
+        Compositing::Linear | Compositing::Exponential => {
+            // Opacity beyond 1 is a rounding error and must not hide another part.
+            let rest = (1.0 - front[3]).max(0.0);
+            std::array::from_fn(|channel| front[channel] + rest * back[channel])
         }
+        Compositing::Xray | Compositing::Average => std::array::from_fn(|channel| front[channel] + back[channel]),
+        // The nearest of equal ones.
+        Compositing::Maximum | Compositing::Minimum => {
+            if back[3] > front[3] {
+                back
+            } else {
+                front
+            }
+        }
+        Compositing::Surface if front[3] >= 1.0 => front,
+        Compositing::Surface => back,
     }
 }

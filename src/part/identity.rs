@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::UVec3;
 
 use super::check::adds_up;
-use super::content::{Content, Rule};
+use super::content::Content;
 use super::fingerprint;
 use super::mean::{MeanTables, note_labels};
 use crate::error::RenderError;
@@ -112,7 +112,7 @@ impl Identity {
 
     /// Whether pixels carry extremes.
     pub(crate) fn has_extremes(&self) -> bool {
-        self.rule().has_extremes()
+        self.compositing.chooses_values(self.classification)
     }
 
     /// Whether pixels note labels, whose tables classify means.
@@ -124,9 +124,5 @@ impl Identity {
     pub(super) fn splatting(&self) -> Splatting {
         let Self { compositing, opacity_threshold, culling, .. } = *self;
         Splatting { compositing, opacity_threshold, culling, ..Splatting::default() }
-    }
-
-    pub(super) fn rule(&self) -> Rule {
-        Rule { compositing: self.compositing, classification: self.classification }
     }
 }

@@ -301,13 +301,14 @@ fn merge_neighbours(parts: Vec<Part>, identity: &Identity, region: Region) -> Re
             return Err(missing(before.end..slabs.start, region));
         }
     }
+    let rule = (identity.compositing, identity.classification);
     let mut merged: Vec<Merged> = shown.into_iter().map(|(slabs, _, contents)| (slabs, contents)).collect();
     while merged.len() > 1 {
         let mut rest = merged.into_iter();
         merged = std::iter::from_fn(|| {
             let (mut slabs, mut front) = rest.next()?;
             if let Some((behind, back)) = rest.next() {
-                front.iter_mut().zip(&back).for_each(|(front, back)| identity.rule().merge(front, back));
+                front.iter_mut().zip(&back).for_each(|(front, back)| front.merge(back, rule));
                 slabs.end = behind.end;
             }
             Some((slabs, front))

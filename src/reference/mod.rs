@@ -172,24 +172,11 @@ fn render_joined(
 }
 
 /// The pixels of a part of a scene's image, before the background (SPEC §11). Nothing is culled. The window has no end where it reaches an end
-/// of the scene.
+/// of the scene. `lights` are those of all channels, or of the whole volume of a box, if they are not the volume's own.
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
 pub fn part(
-    volume: &Volume,
-    transfer: &[TransferFunction],
-    scene: &Scene,
-    window: &Window,
-) -> Result<Content, RenderError> {
-    lit_part(volume, transfer, (scene, None), window)
-}
-
-/// [`part`]; `lights` are those of all channels, or of the whole volume of a box, if they are not the volume's own.
-///
-/// # Errors
-/// As for [`part`].
-pub fn lit_part(
     volume: &Volume,
     transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),

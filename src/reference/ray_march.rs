@@ -11,7 +11,6 @@ use glam::{DVec3, DVec4, IVec3, UVec2, UVec3};
 use super::composite::composite_pixel;
 use super::{Buffer, Geometry, Lights, cut, resolve, shading};
 use crate::error::RenderError;
-use crate::image::Image;
 use crate::kernel::Kernel;
 use crate::parallel::prelude::*;
 use crate::scene::Scene;
@@ -24,16 +23,6 @@ pub const STEP: f64 = 0.05;
 
 /// A ray ends early when its pixel cannot change by more than this.
 const REST: f64 = 1e-7;
-
-/// Marches the rays of all pixels of a scene.
-///
-/// # Errors
-/// If the scene needs more than can be computed.
-pub fn render(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Image, RenderError> {
-    let (width, height) = (scene.image.width, scene.image.height);
-    let all: Vec<UVec2> = (0..height).flat_map(|y| (0..width).map(move |x| UVec2::new(x, y))).collect();
-    Ok(Image { width, height, pixels: pixels(volume, transfer, scene, &all)? })
-}
 
 /// Marches the rays of some pixels of a scene.
 ///

@@ -73,7 +73,7 @@ pub(super) fn streamed(scene: &Scene, access: &Access) -> Option<Result<Channels
         for (number, settings) in (1..).zip(others) {
             let own = streamed_file(settings, access)?;
             single(own.len(), number, settings)?;
-            channels.extend(own);
+            own.into_iter().for_each(|channel| channels.push(channel));
         }
         Ok(channels)
     })

@@ -41,11 +41,6 @@ impl<T> Channels<T> {
         self.0.truncate(count.max(1));
     }
 
-    /// A list of references to the items.
-    pub fn each(&self) -> Channels<&T> {
-        Channels(self.0.iter().collect())
-    }
-
     /// A list of what a function makes of every item.
     pub fn map<U>(self, of: impl FnMut(T) -> U) -> Channels<U> {
         Channels(self.0.into_iter().map(of).collect())
@@ -57,12 +52,6 @@ impl<T> Channels<T> {
     /// The first one.
     pub fn try_map<U, E>(self, of: impl FnMut(T) -> Result<U, E>) -> Result<Channels<U>, E> {
         Ok(Channels(self.0.into_iter().map(of).collect::<Result<_, E>>()?))
-    }
-}
-
-impl<T> Extend<T> for Channels<T> {
-    fn extend<I: IntoIterator<Item = T>>(&mut self, items: I) {
-        self.0.extend(items);
     }
 }
 
@@ -102,15 +91,6 @@ impl<'a, T> IntoIterator for &'a Channels<T> {
 
     fn into_iter(self) -> Self::IntoIter {
         self.0.iter()
-    }
-}
-
-impl<'a, T> IntoIterator for &'a mut Channels<T> {
-    type Item = &'a mut T;
-    type IntoIter = std::slice::IterMut<'a, T>;
-
-    fn into_iter(self) -> Self::IntoIter {
-        self.0.iter_mut()
     }
 }
 

@@ -348,8 +348,10 @@ fn read_every(
             names: labels.store.facts().label_names,
         })
     };
-    let samples = channels.each().try_map(sample)?;
-    Ok(Volume { reads: Some(reads), ..Volume::of_channels(&channels.first().values.origin, samples)? })
+    let mut samples = channels.iter().map(sample).collect::<Result<Vec<_>, VolumeError>>()?;
+    let others = samples.split_off(1);
+    let first = samples.remove(0).with_channels(&channels.first().values.origin, others)?;
+    Ok(Volume { reads: Some(reads), ..first })
 }
 
 impl Volume {

@@ -176,7 +176,7 @@ fn at_finest_level(scene: &Scene) -> Scene {
     let finest =
         |volume: &VolumeSource, level: Option<u32>| level.or(matches!(volume, VolumeSource::File(_)).then_some(0));
     let mut scene = scene.clone();
-    for channel in &mut scene.channels {
+    for channel in scene.channels.iter_mut() {
         channel.level = finest(&channel.volume, channel.level);
     }
     scene
