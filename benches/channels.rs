@@ -44,7 +44,7 @@ fn main() {
         one.splatting.compositing = Compositing::Exponential;
         one.splatting.rasterizer = Rasterizer::Tiles;
         one = one.explicit_all_around(&volume);
-        one.transfer.opacity = with_opacities(&one, |opacity| opacity * factor);
+        one.channels[0].transfer.opacity = with_opacities(&one, |opacity| opacity * factor);
         let (all, several) = several(&volume, &one);
         for (classification, backend, allowed) in CASES {
             let of = |scene: &Scene| {
@@ -67,29 +67,26 @@ fn main() {
 
 /// A scene's opacities, changed.
 fn with_opacities(scene: &Scene, change: impl Fn(f64) -> f64) -> Option<Ramp<f64>> {
-    let points = scene.transfer.opacity.as_ref().unwrap().points();
+    let points = scene.channels[0].transfer.opacity.as_ref().unwrap().points();
     Ramp::new(points.iter().map(|&(at, opacity)| (at, change(opacity))).collect()).ok()
 }
 
 /// The volume as several channels, and the scene that shows each in a colour of its own, with opacities that together are the scene's.
 fn several(volume: &Volume, scene: &Scene) -> (Volume, Scene) {
     let all = volume.clone().with_channels("bench", vec![volume.clone(); COUNT - 1]).unwrap();
-    let mut transfer = scene.transfer.clone();
+    let mut transfer = scene.channels[0].transfer.clone();
     transfer.opacity = with_opacities(scene, |opacity| 1.0 - (1.0 - opacity).powf(1.0 / COUNT as f64));
     let of_channel = |color: DVec3| {
         let mut transfer = transfer.clone();
         transfer.color = Some(Ramp::new(vec![(0.0, color)]).unwrap());
         transfer
     };
-    let [first, further @ ..] = [DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE].map(of_channel);
-    let mut scene = Scene { transfer: first, ..scene.clone() };
-    scene.further = further
-        .map(|transfer| {
-            let mut channel = Channel::new(VolumeSource::Memory);
-            channel.transfer = transfer;
-            channel
-        })
-        .to_vec();
+    let mut scene = scene.clone().with_transfer(of_channel(DVec3::X));
+    for color in [DVec3::Y, DVec3::Z, DVec3::ONE] {
+        let mut channel = Channel::new(VolumeSource::Memory);
+        channel.transfer = of_channel(color);
+        scene.channels.push(channel);
+    }
     (all, scene)
 }
 

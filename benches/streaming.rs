@@ -84,7 +84,7 @@ fn draw_scene(name: &str, chunk: usize, folder: &Path) {
         let text = fs::read_to_string(&index).unwrap();
         IndexedStore::new(store, StoreIndex::decode("index", &text).unwrap(), "index").unwrap()
     };
-    let opacity = scene.transfer.opacity.clone().unwrap();
+    let opacity = scene.channels[0].transfer.opacity.clone().unwrap();
     let across = indexed.levels()[0].chunks();
     let is_visible = |at: &u32| {
         let chunk = UVec3::new(at % across.x, at / across.x % across.y, at / (across.x * across.y));

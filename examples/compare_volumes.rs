@@ -19,7 +19,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let first = Scene::from_volume(source(0, "head:64"), &settings)?;
     // Both use the transfer function that is chosen for the first volume.
     let first = first.explicit(&first.load_volume()?);
-    let second = Scene { volume: source(1, "head:48"), ..first.clone() };
+    let second = first.clone().with_volume(source(1, "head:48"));
     let [first, second] = [headless.render(&first)?, headless.render(&second)?];
 
     let comparison = Comparison::new(&first.image, &second.image, Tolerance::default())?;

@@ -111,6 +111,7 @@ pub mod appearance;
 #[cfg(feature = "cpu")]
 pub mod cpu;
 mod error;
+mod finished;
 mod geometry;
 #[cfg(feature = "golden")]
 pub mod golden;

@@ -34,7 +34,7 @@ impl Pick {
     /// The point at a depth of a pixel's ray.
     pub(crate) fn at(
         view: &ViewGeometry,
-        (volume, transfer): (&Volume, &TransferFunction),
+        (volume, transfer): (&Volume, &[TransferFunction]),
         pixel: [u32; 2],
         depth: f64,
     ) -> Self {
@@ -54,7 +54,7 @@ impl Pick {
                 tables.alpha(value, tables.gradient(volume, voxel).length()) * volume.alpha_of(index)
             }
         };
-        let opacities = volume.channels().zip(transfer.channels()).map(opacity).enumerate();
+        let opacities = volume.channels().zip(transfer).map(opacity).enumerate();
         let (channel, _) = opacities.fold((0, 0.0), |best, of| if of.1 > best.1 { of } else { best });
         let of_channel = volume.channel(channel).unwrap_or(volume);
         let (value, label) = (of_channel.values().at(index as usize), of_channel.label(index));
@@ -93,7 +93,7 @@ impl FirstHits {
     /// If the frame has no first hits, or the pixel lies outside the image.
     pub(crate) fn pick(
         hits: Option<&Self>,
-        of: (&Volume, &TransferFunction),
+        of: (&Volume, &[TransferFunction]),
         pixel: [u32; 2],
         image: &ImageSettings,
     ) -> Result<Option<Pick>, SettingError> {

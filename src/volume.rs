@@ -2,7 +2,7 @@
 
 #[doc(inline)]
 pub use sheetsplat_volume::{
-    BytesRead, ChannelDisplay, ChunkProgress, Encoding, Files, Grid, IndexedStore, Inputs, Labels, Members,
+    BytesRead, ChannelDisplay, Channels, ChunkProgress, Encoding, Files, Grid, IndexedStore, Inputs, Labels, Members,
     Orientation, Outputs, PatientSide, RawLayout, ReadOptions, SampleType, Store, StoreFacts, StoreIndex, StoreLevel,
     StreamedChannel, StreamedLevel, StreamedVolume, Texel, ValueIter, ValueSlice, Values, Volume, VolumeError, builtin,
     open_raw_store, open_store, sample,

@@ -89,7 +89,7 @@ fn turns(headless: &GpuHeadless) -> String {
     let neuron = neuron().map(|neuron| ("neuron", Arc::new(neuron.load_volume().unwrap()), neuron));
     let opaque = open("nerve", &[]);
     for (object, volume, scene) in [("nerve", volume, opaque)].into_iter().chain(neuron) {
-        let translucent = Scene { transfer: translucent.transfer.clone(), ..scene.clone() };
+        let translucent = scene.clone().with_transfer(translucent.channels[0].transfer.clone());
         text += &curve(headless, object, &volume, &translucent);
         text += &curve(headless, &format!("{object}-opaque"), &volume, &scene);
     }

@@ -31,10 +31,10 @@ fn shared(path: &str) -> Option<PathBuf> {
 /// The nerve's scene with a measured cell in it, if that exists.
 pub(crate) fn neuron() -> Option<Scene> {
     let scene = open("nerve", &[]);
-    shared("data/neuron.nrrd").map(|path| Scene {
-        volume: VolumeSource::File(path),
-        spacing: Some(NEURON_SPACING),
-        ..scene
+    shared("data/neuron.nrrd").map(|path| {
+        let mut scene = scene.with_volume(VolumeSource::File(path));
+        scene.channels.first_mut().spacing = Some(NEURON_SPACING);
+        scene
     })
 }
 

@@ -69,7 +69,7 @@ impl Scene {
     /// Whether the scene names its volume.
     #[getter]
     fn names_volume(&self) -> bool {
-        self.scene.volume != VolumeSource::Memory
+        self.scene.channels.first().volume != VolumeSource::Memory
     }
 
     /// The volume that the scene names.
@@ -133,7 +133,7 @@ impl Scene {
     /// Refuses a file that would replace one that the scene names.
     fn check_output(&self, path: PathBuf) -> PyResult<()> {
         let outputs = Outputs::new([&path]);
-        for channel in self.scene.channels() {
+        for channel in &self.scene.channels {
             for named in [channel.volume.path(), channel.labels.as_deref()].into_iter().flatten() {
                 outputs.check_file(named, named).map_err(Raised::from)?;
             }

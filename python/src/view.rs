@@ -192,8 +192,7 @@ fn worded(
     if annotations.is_empty() {
         return Ok((None, scene));
     }
-    scene.check()?;
-    scene.check_volume(volume)?;
+    scene.check_for(volume)?;
     let layout = layout(annotations, &scene, volume)?;
     let beside = layout.scene(&scene).explicit(volume);
     Ok((Some(layout), beside))

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use sheetsplat::appearance::{Preset, quantiles};
 use sheetsplat::glam::{DMat3, DVec3, UVec3};
 use sheetsplat::scene::{OpenVolume, VolumeSource};
-use sheetsplat::volume::{Inputs, Labels, Orientation, ReadOptions, ValueSlice, Values};
+use sheetsplat::volume::{Channels, Inputs, Labels, Orientation, ReadOptions, ValueSlice, Values};
 
 use crate::array;
 use crate::error::{self, Raised, setting};
@@ -140,10 +140,9 @@ impl Volume {
             let channel = |(dims, values): ([u32; 3], Values)| {
                 sheetsplat::Volume::from_values(ORIGIN, dims.into(), zyx(spacing), values)
             };
-            let mut volumes = channels.into_iter().map(channel).collect::<Result<Vec<_>, _>>()?;
-            let further = volumes.split_off(volumes.len().min(1));
-            let first = volumes.pop().ok_or_else(|| error::volume("channels", "none", "at least one"))?;
-            let volume = first.with_channels(ORIGIN, further)?.with_orientation(ORIGIN, orientation)?;
+            let channels = Channels::of(channels).ok_or_else(|| error::volume("channels", "none", "at least one"))?;
+            let volume = sheetsplat::Volume::of_channels(ORIGIN, channels.try_map(channel)?)?;
+            let volume = volume.with_orientation(ORIGIN, orientation)?;
             let volume = unit.iter().fold(volume, |volume, unit| volume.with_unit(unit));
             let volume = changed(volume, None, labels)?.into();
             warn_of_holes(&volume, masked);
@@ -178,17 +177,18 @@ impl Volume {
         let builtin = path.to_str().and_then(|path| path.strip_prefix(BUILTIN)).map(str::to_owned);
         let source = builtin.clone().map_or(VolumeSource::File(path), VolumeSource::Builtin);
         let mut shown = match scene {
-            Some(scene) => sheetsplat::Scene { volume: source, ..scene.scene.clone() },
+            Some(scene) => scene.scene.clone().with_volume(source),
             None => sheetsplat::Scene::from_volume(source, &[]).map_err(Raised::from)?,
         };
-        [shown.index, shown.time, shown.level] = selection;
-        shown.series = series;
-        (shown.spacing, shown.labels) = (None, None);
-        if scene.is_none() && builtin.is_none() {
-            shown.level = shown.level.or(Some(0));
-        }
-        for channel in &mut shown.further {
+        for channel in &mut shown.channels[1..] {
             (channel.volume, channel.spacing, channel.labels) = (VolumeSource::Memory, None, None);
+        }
+        let first = shown.channels.first_mut();
+        [first.index, first.time, first.level] = selection;
+        first.series = series;
+        (first.spacing, first.labels) = (None, None);
+        if scene.is_none() && builtin.is_none() {
+            first.level = first.level.or(Some(0));
         }
         let volume = detached(py, move || {
             let volume = replaced(shown.open_volume_with(&options)?, spacing, labels)?;
@@ -242,7 +242,7 @@ impl Volume {
     /// The number of channels.
     #[getter]
     fn channels(&self) -> usize {
-        self.0.sample().channels().count()
+        self.0.sample().channel_count()
     }
 
     #[getter]

@@ -88,7 +88,7 @@ pub fn table(tables: &Tables, splatting: &Splatting, numbers: &Normalization) ->
     let [least, greatest] = if greatest > least { [least, greatest] } else { [first, end] };
     let per_number = bins as f64 / (greatest - least);
     // A surface is where the opacity is one half. The middle of a cubic slab that shows anything may be there where neither plane is.
-    let is_half = compositing == Compositing::Surface && splatting.slab_profile == SlabProfile::Linear;
+    let is_half = compositing.has_surface() && splatting.slab_profile == SlabProfile::Linear;
     let is_shown = |alpha: f64| if is_half { alpha >= 0.5 } else { alpha > 0.0 };
     let shown = cells.iter().filter(|cell| is_shown(cell.alpha[0].max(cell.alpha[1])));
     // Nothing lies between these if nothing has such an opacity.
@@ -148,7 +148,7 @@ fn cells(tables: &Tables, compositing: Compositing, [least, greatest]: [f64; 2],
         tables.iso_ranges.iter().flat_map(|ranges| ranges.iter().map(|range| range.map(positions))).collect();
     let is_single = |[low, high]: [f64; 2]| low as f32 >= (high as f32).next_down();
     let mut singles = Vec::new();
-    if compositing == Compositing::Surface {
+    if compositing.has_surface() {
         for range in iso_ranges.iter_mut().filter(|range| is_single(**range)) {
             *range = [(range[0] as f32).next_down().into(), (range[1] as f32).next_up().into()];
             singles.push(*range);
@@ -189,7 +189,7 @@ fn positions_of<T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output 
 /// Cuts a range over which α is linear into pieces that are short enough for the logarithm of `exponential`.
 fn pieces(compositing: Compositing, [low, high]: [f64; 2], alpha: [f64; 2]) -> Vec<[f64; 2]> {
     let mut cuts = vec![low, high];
-    if compositing == Compositing::Exponential && alpha[0] != alpha[1] {
+    if compositing.is_optical_depth() && alpha[0] != alpha[1] {
         let [larger, smaller] = [1.0 - alpha[0].min(alpha[1]), (1.0 - alpha[0].max(alpha[1])).max(1.0 - MAX_ALPHA)];
         // Rounded here, so that α is that of the rounded place: the logarithm makes much of it.
         let place = |transparency: f64| {
@@ -206,7 +206,7 @@ fn pieces(compositing: Compositing, [low, high]: [f64; 2], alpha: [f64; 2]) -> V
 
 /// m of SPEC §5.
 fn amount(compositing: Compositing, alpha: f64) -> f64 {
-    if compositing == Compositing::Exponential { -libm::log1p(-alpha.min(MAX_ALPHA)) } else { alpha }
+    if compositing.is_optical_depth() { -libm::log1p(-alpha.min(MAX_ALPHA)) } else { alpha }
 }
 
 /// The integrals over a cell, with moments relative to `from`.
@@ -341,7 +341,7 @@ impl SlabIntegral {
 
 /// m of SPEC §5 as `shaders/shared/shading.wgsl` computes it.
 fn amount_f32(compositing: Compositing, alpha: f32) -> f32 {
-    if compositing != Compositing::Exponential {
+    if !compositing.is_optical_depth() {
         return alpha;
     }
     if alpha < 0.0625 {

@@ -11,7 +11,7 @@ use crate::SettingError;
 use crate::appearance::{categories, shown_range};
 use crate::image::Image;
 use crate::scene::Scene;
-use crate::settings::{Compositing, TransferFunction};
+use crate::settings::TransferFunction;
 use crate::volume::Volume;
 
 /// The width of a bar, the length of a tick, the distance between a tick and its number, and between two channels' bars, in heights of the font.
@@ -28,23 +28,20 @@ const SHARE: f64 = 0.6;
 pub(super) fn plate(
     scene: &Scene,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     style: &Style,
     room: u32,
 ) -> Result<Image, SettingError> {
     // Where a pixel shows a single value, its opacity acts as brightness.
-    let is_projection = match scene.splatting.compositing {
-        Compositing::Maximum | Compositing::Minimum => true,
-        Compositing::Xray | Compositing::Average => {
-            let found = "splatting.compositing = \"xray\" or \"average\", which add colours up";
-            return Err(refused("colors", found, "any other compositing"));
-        }
-        _ => false,
-    };
-    let are_several = !volume.further().is_empty();
+    let is_projection = scene.splatting.compositing.is_extreme();
+    if scene.splatting.compositing.is_sum() {
+        let found = "splatting.compositing = \"xray\" or \"average\", which add colours up";
+        return Err(refused("colors", found, "any other compositing"));
+    }
+    let are_several = volume.channel_count() > 1;
     let height = ((f64::from(room) * SHARE) as u32).max(1);
     let mut bars = Vec::new();
-    for (number, (channel, transfer)) in volume.channels().zip(transfer.channels()).enumerate() {
+    for (number, (channel, transfer)) in volume.channels().zip(transfer).enumerate() {
         let are_colors = channel.colors().is_some();
         let are_labels = channel.labels().is_none() && categories::is_label_map(channel);
         match are_several {
@@ -80,9 +77,9 @@ pub(super) fn plate(
 /// A channel's name, and the unit of its values in parentheses, as far as they are known; of several channels always a name.
 fn title(scene: &Scene, volume: &Volume, number: usize) -> Option<String> {
     let channel = volume.channel(number)?;
-    let stated = scene.channels().nth(number).and_then(|channel| channel.name.clone());
+    let stated = scene.channels.get(number).and_then(|channel| channel.name.clone());
     let name = stated.or_else(|| channel.channel_name().map(str::to_owned));
-    let name = name.or_else(|| (!volume.further().is_empty()).then(|| scene.channel_name(volume, number)));
+    let name = name.or_else(|| (volume.channel_count() > 1).then(|| scene.channel_name(volume, number)));
     match (name, channel.value_unit()) {
         (Some(name), Some(unit)) => Some(format!("{name} ({unit})")),
         (None, Some(unit)) => Some(unit.to_owned()),

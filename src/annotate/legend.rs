@@ -30,12 +30,14 @@ struct Entry {
 pub(super) fn plate(
     scene: &Scene,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     style: &Style,
     room: u32,
 ) -> Result<Image, SettingError> {
-    let mut entries =
-        if volume.further().is_empty() { entries(volume, transfer)? } else { channels(scene, volume, transfer)? };
+    let mut entries = match transfer {
+        [transfer] => entries(volume, transfer)?,
+        _ => channels(scene, volume, transfer)?,
+    };
     for Entry { text, .. } in &mut entries {
         *text = text::fitted(text, style.em, style.pixels(LONGEST));
     }
@@ -65,7 +67,7 @@ pub(super) fn plate(
 }
 
 /// The channels that show something, each with its colours over the values that it shows; in place of a label map, its labels.
-fn channels(scene: &Scene, volume: &Volume, transfer: &TransferFunction) -> Result<Vec<Entry>, SettingError> {
+fn channels(scene: &Scene, volume: &Volume, transfer: &[TransferFunction]) -> Result<Vec<Entry>, SettingError> {
     let entry = |(number, (channel, transfer)): (usize, (&Volume, &TransferFunction))| {
         let Some([low, high]) = shown_range(channel, transfer) else { return Vec::new() };
         if channel.labels().is_none() && categories::is_label_map(channel) {
@@ -76,7 +78,7 @@ fn channels(scene: &Scene, volume: &Volume, transfer: &TransferFunction) -> Resu
         let text = scene.channel_name(volume, number);
         vec![Entry { text, colors: (0..COLORS).map(color).collect() }]
     };
-    let entries: Vec<Entry> = volume.channels().zip(transfer.channels()).enumerate().flat_map(entry).collect();
+    let entries: Vec<Entry> = volume.channels().zip(transfer).enumerate().flat_map(entry).collect();
     if entries.is_empty() {
         return Err(refused("legend", "no channel with an opacity above 0", "visible channels"));
     }

@@ -150,7 +150,7 @@ impl Preset {
     }
 
     /// The transfer function for a channel after the first of several: with [`Self::Fusion`] hot and translucent, else as for the first.
-    pub(crate) fn transfer_of_further(self, volume: &Volume) -> TransferFunction {
+    pub(crate) fn transfer_of_later(self, volume: &Volume) -> TransferFunction {
         match self {
             Self::Fusion => Object::find(volume.values()).map_or_else(|| constant(0.1), |object| hot(volume, &object)),
             _ => self.transfer(volume),

@@ -32,7 +32,7 @@ impl Preset {
         if categories::is_label_map(volume) {
             return Some(Self::Labels);
         }
-        if !volume.further().is_empty() || volume.unit().is_some_and(|unit| ["µm", "nm"].contains(&unit)) {
+        if volume.channel_count() > 1 || volume.unit().is_some_and(|unit| ["µm", "nm"].contains(&unit)) {
             return Some(Self::Confocal);
         }
         let values = volume.values();

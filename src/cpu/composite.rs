@@ -67,7 +67,7 @@ impl Compositor {
             Compositing::Minimum => u64::MAX >> (u64::BITS as usize - ROWS),
             _ => filled,
         };
-        let has_empty = matches!(self.compositing, Compositing::Surface | Compositing::Minimum);
+        let has_empty = self.compositing.has_surface() || self.compositing.keeps_least();
         let tiles = tiles_of(rows & open.rows());
         while rows != 0 {
             let row = rows.trailing_zeros() as usize;
@@ -103,7 +103,7 @@ impl Compositor {
         if let Some(rows) = &rays.shown {
             shown = [load(&rows[row][0]), load(&rows[row][1])];
             closed = shown[1].simd_le(splat(stretch.slab + 1.0)).to_bitmask() as u32;
-            if self.compositing != Compositing::Minimum {
+            if !self.compositing.keeps_least() {
                 let [start, end] = within(simd, shown, stretch);
                 pixels = scaled(pixels, (end - start).max(splat(0.0)));
             }
@@ -190,7 +190,7 @@ impl Compositor {
         shown: [f32x8<S>; 2],
         stretch: Stretch,
     ) -> f32x8<S> {
-        let is_surface = self.compositing == Compositing::Surface;
+        let is_surface = self.compositing.has_surface();
         let opacity = f32x8::splat(simd, if is_surface { 1.0 } else { self.first_hit.unwrap_or(1.0) });
         let is_here = before.simd_lt(opacity) & after.simd_ge(opacity);
         let at = if is_surface {

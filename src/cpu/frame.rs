@@ -32,7 +32,7 @@ use crate::parallel::prelude::*;
 use crate::part::{Content, Extreme, Resolver};
 use crate::scene::Scene;
 use crate::settings::clip::CutCells;
-use crate::settings::splatting::{Classification, Compositing, Method, Order};
+use crate::settings::splatting::{Classification, Method};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::Counts;
@@ -156,9 +156,6 @@ impl<'a> Frame<'a> {
         let (right, down) = (from_pixels.x_axis, from_pixels.y_axis);
         let metric = [right.length_squared(), 2.0 * right.dot(down), down.length_squared()];
         let is_each = splatting.method == Method::CompositeEverySample;
-        let can_hide = splatting.compositing.hides() && splatting.order == Order::FrontToBack && !is_each;
-        // While no surface has been reached, the compositing buffer holds a mean, not an opacity: only a surface, whose opacity is 1, hides anything.
-        let threshold = if splatting.compositing == Compositing::Surface { 1.0 } else { splatting.opacity_threshold };
         let splatter = Splatter {
             kernel: KernelTables::new(&kernel),
             radius: splatting.radius as f32,
@@ -169,7 +166,7 @@ impl<'a> Frame<'a> {
         let compositor = Compositor {
             compositing: splatting.compositing,
             order: splatting.order,
-            threshold: (splatting.culling && can_hide).then_some(threshold as f32),
+            threshold: splatting.culls_from().filter(|_| !is_each).map(|opacity| opacity as f32),
             first_hit: first_hit.map(|opacity| opacity as f32),
         };
         let (bricks, overlaps) = match &voxels {

@@ -9,6 +9,7 @@ use super::after::Coefficients;
 use super::frame::{Drawing, Host, Reused, Voxels};
 use super::material::Materials;
 use crate::error::RenderError;
+use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::channels::Joining;
 use crate::lists::brick::BrickList;
@@ -22,7 +23,7 @@ use crate::volume::Volume;
 #[derive(Clone, Debug)]
 pub(super) struct Layer {
     volume: Arc<Volume>,
-    transfer: TransferFunction,
+    transfer: Vec<TransferFunction>,
     list: List,
 }
 
@@ -36,13 +37,13 @@ enum List {
 }
 
 impl Layer {
-    fn new(volume: &Arc<Volume>, transfer: TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
-        let list = List::new(volume, &transfer, scene)?;
-        Ok(Self { volume: Arc::clone(volume), transfer, list })
+    fn new(volume: &Arc<Volume>, transfer: &[TransferFunction], scene: &Scene) -> Result<Self, RenderError> {
+        let list = List::new(volume, transfer, scene)?;
+        Ok(Self { volume: Arc::clone(volume), transfer: transfer.to_vec(), list })
     }
 
     /// Computes again what a change of the scene makes obsolete.
-    fn update(&mut self, transfer: &TransferFunction, (old, new): (&Scene, &Scene)) -> Result<(), RenderError> {
+    fn update(&mut self, transfer: &[TransferFunction], (old, new): (&Scene, &Scene)) -> Result<(), RenderError> {
         let is_same_clip = old.clip == new.clip;
         let (old, splatting) = (&old.splatting, &new.splatting);
         let is_same_kernel =
@@ -61,7 +62,7 @@ impl Layer {
             }
             _ => self.list = List::new(&self.volume, transfer, new)?,
         }
-        self.transfer = transfer.clone();
+        self.transfer = transfer.to_vec();
         Ok(())
     }
 
@@ -92,7 +93,7 @@ impl Layer {
 }
 
 impl List {
-    fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+    fn new(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Self, RenderError> {
         if scene.splatting.classification == Classification::After {
             let coefficients = channels(volume, transfer).map(|(volume, _)| Coefficients::new(volume, scene));
             return Ok(Self::After(coefficients.collect::<Result<_, _>>()?));
@@ -107,34 +108,34 @@ impl List {
 /// How the layers' images become one; `None` if there is one layer of all channels.
 fn joining(volume: &Volume, scene: &Scene) -> Option<Joining> {
     let splatting = &scene.splatting;
-    Joining::of(splatting.compositing, splatting.classification).filter(|_| !volume.further().is_empty())
+    Joining::of_channels(volume.channel_count(), splatting.compositing, splatting.classification)
 }
 
 /// The layers of a scene whose classification is known.
 pub(super) fn layers(
     volume: &Arc<Volume>,
-    transfer: &TransferFunction,
-    scene: &Scene,
+    FinishedScene { scene, transfer }: &FinishedScene,
 ) -> Result<Vec<Layer>, RenderError> {
     if joining(volume, scene).is_none() {
-        return Ok(vec![Layer::new(volume, transfer.clone(), scene)?]);
+        return Ok(vec![Layer::new(volume, transfer, scene)?]);
     }
-    let volumes = std::iter::once(volume).chain(volume.further()).enumerate();
-    volumes.map(|(number, volume)| Layer::new(volume, transfer.of_channel(number), scene)).collect()
+    let channels = volume.shared_channels().zip(transfer);
+    channels.map(|(volume, transfer)| Layer::new(volume, std::slice::from_ref(transfer), scene)).collect()
 }
 
 /// Computes again what a change of the scene makes obsolete.
 pub(super) fn update(
     layers: &mut Vec<Layer>,
-    (volume, transfer): (&Arc<Volume>, &TransferFunction),
-    (old, new): (&Scene, &Scene),
+    volume: &Arc<Volume>,
+    (old, new): (&FinishedScene, &FinishedScene),
 ) -> Result<(), RenderError> {
-    match joining(volume, new) {
-        joined if joined.is_some() != joining(volume, old).is_some() => *layers = self::layers(volume, transfer, new)?,
-        None => layers[0].update(transfer, (old, new))?,
+    let scenes = (&old.scene, &new.scene);
+    match joining(volume, scenes.1) {
+        joined if joined.is_some() != joining(volume, scenes.0).is_some() => *layers = self::layers(volume, new)?,
+        None => layers[0].update(&new.transfer, scenes)?,
         Some(_) => {
-            for (number, layer) in layers.iter_mut().enumerate() {
-                layer.update(&transfer.of_channel(number), (old, new))?;
+            for (layer, transfer) in layers.iter_mut().zip(&new.transfer) {
+                layer.update(std::slice::from_ref(transfer), scenes)?;
             }
         }
     }
@@ -148,14 +149,11 @@ pub(super) fn draw(layers: &mut [Layer], scene: &Scene, view: ViewGeometry, host
     };
     let mut by_itself = scene.clone();
     by_itself.image.background = [0.0; 4];
-    let first_hit = match joining {
-        Joining::Sum => host.first_hit,
-        Joining::Nearest => host.first_hit.or(Some(1.0)),
-    };
+    let first_hit = joining.first_hit(host.first_hit);
     let draw = |layer: &mut Layer| layer.draw(&by_itself, view, Host { first_hit, ..host.clone() }, level);
-    let (first, further) = layers.split_at_mut(1);
+    let (first, others) = layers.split_at_mut(1);
     let mut all = draw(&mut first[0]);
-    for layer in further {
+    for layer in others {
         let Drawing { content, counts, first_hits } = draw(layer);
         joining.join((&mut all.content.colors, &mut all.first_hits), (&content.colors, &first_hits));
         all.counts.add_channel(&counts);
@@ -204,7 +202,7 @@ mod tests {
             let list = list_of(&renderer);
             scene.camera = scene.camera.turned(20.0);
             scene.shading.ambient = 0.5;
-            scene.splatting.compositing = crate::settings::splatting::Compositing::Xray;
+            scene.splatting.compositing = crate::appearance::Preset::Xray.compositing();
             scene.splatting.slab_width = 0.5;
             renderer.set_scene(&scene).unwrap();
             renderer.draw().unwrap();
@@ -223,7 +221,7 @@ mod tests {
         scene.splatting.classification = Classification::After;
         let mut renderer = CpuRenderer::new(scene.load_volume().unwrap(), &scene).unwrap();
         let mut places = |points: &[(f64, f64)]| {
-            scene.transfer.opacity = Some(Ramp::new(points.to_vec()).unwrap());
+            scene.channels[0].transfer.opacity = Some(Ramp::new(points.to_vec()).unwrap());
             renderer.set_scene(&scene).unwrap();
             renderer.draw().unwrap();
             let List::After(coefficients) = &renderer.layers[0].list else { unreachable!() };

@@ -18,7 +18,7 @@ const HAIR: f64 = 0.01;
 #[derive(Clone, Debug)]
 pub(super) struct Means {
     compositing: Compositing,
-    /// Around what counts: for [`Compositing::Average`] all voxels, for [`Compositing::Minimum`] what kernels fill, a hair wider.
+    /// Around what counts: for `average` all voxels, for `minimum` what kernels fill, a hair wider.
     counted: [HalfSpace; 6],
     /// Around the voxels' centres, a hair wider.
     centers: [HalfSpace; 6],
@@ -30,7 +30,7 @@ impl Means {
     pub(super) fn new(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Self {
         let RayBox { center, half, nearest } = RayBox::new(view, grid, splatting);
         let compositing = splatting.compositing;
-        let spare = if compositing == Compositing::Minimum { HAIR } else { 0.0 };
+        let spare = if compositing.keeps_least() { HAIR } else { 0.0 };
         let around = |half: DVec3| HalfSpace::around(center, half, grid);
         let (_, centers) = grid.whole();
         Self { compositing, counted: around(half + spare), centers: around(centers + HAIR), nearest }
@@ -38,12 +38,12 @@ impl Means {
 
     /// True if some slabs do not count.
     pub(super) fn is_choosy(&self) -> bool {
-        self.compositing == Compositing::Minimum
+        self.compositing.keeps_least()
     }
 
     /// The factor that turns sheets into means for a ray with these visible depths.
     pub(super) fn weight(&self, ray: &PixelRay, shown: Range<f64>) -> f64 {
-        if self.compositing != Compositing::Average {
+        if !self.compositing.is_average() {
             return ray.slabs_per_depth() / ray.length();
         }
         let depths = self.within(ray, &self.counted, shown);

@@ -54,16 +54,16 @@ use web_time::Instant;
 
 use crate::error::RenderError;
 use crate::error::setting::{Interval, SettingError};
+use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::light::KeptLight;
 use crate::part::{self, Content, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::rendering::{Backend, Rendering};
-use crate::scene::{ImageSettings, Scene};
+use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::splatting::check_first_hit;
-use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
 use crate::volume::Volume;
@@ -77,8 +77,7 @@ pub use stream::StreamRenderer;
 #[derive(Clone, Debug)]
 pub struct CpuRenderer {
     volume: Arc<Volume>,
-    scene: Scene,
-    transfer: TransferFunction,
+    finished: FinishedScene,
     layers: Vec<Layer>,
     simd: Simd,
     level: Level,
@@ -98,15 +97,12 @@ impl CpuRenderer {
     /// If this backend does not support a setting of the scene, or the volume lacks what the scene needs, such as labels.
     pub fn new(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Self, RenderError> {
         let volume = volume.into();
-        scene.check()?;
-        scene.check_volume(&volume)?;
+        let finished = FinishedScene::new(&volume, scene)?;
         check(scene)?;
         let (simd, level) = simd::chosen()?;
-        let scene = scene.settled(&volume);
-        let transfer = scene.resolve(&volume);
-        let layers = layer::layers(&volume, &transfer, &scene)?;
+        let layers = layer::layers(&volume, &finished)?;
         let (first_hit, surfaces, hits, light) = (None, None, None, KeptLight::default());
-        Ok(Self { volume, scene, transfer, layers, simd, level, first_hit, surfaces, hits, light })
+        Ok(Self { volume, finished, layers, simd, level, first_hit, surfaces, hits, light })
     }
 
     /// The volume that is drawn.
@@ -121,7 +117,7 @@ impl CpuRenderer {
 
     /// The settings.
     pub fn scene(&self) -> &Scene {
-        &self.scene
+        &self.finished.scene
     }
 
     /// Draws by an instruction set other than the best one, or than that which the environment variable `SHEETSPLAT_SIMD` names. No bit of an
@@ -141,13 +137,10 @@ impl CpuRenderer {
     /// # Errors
     /// As for [`Self::new`]; then nothing changes.
     pub fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        scene.check()?;
-        scene.check_volume(&self.volume)?;
+        let finished = FinishedScene::new(&self.volume, scene)?;
         check(scene)?;
-        let scene = scene.settled(&self.volume);
-        let transfer = scene.resolve(&self.volume);
-        layer::update(&mut self.layers, (&self.volume, &transfer), (&self.scene, &scene))?;
-        (self.scene, self.transfer) = (scene, transfer);
+        layer::update(&mut self.layers, &self.volume, (&self.finished, &finished))?;
+        self.finished = finished;
         Ok(())
     }
 
@@ -156,9 +149,7 @@ impl CpuRenderer {
     /// # Errors
     /// If a setting is not allowed; then nothing changes.
     pub fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
-        camera.check()?;
-        self.scene.camera = camera;
-        Ok(())
+        self.finished.set_camera(camera)
     }
 
     /// Turns the camera about its `up` by an angle in degrees, right-handed.
@@ -167,13 +158,13 @@ impl CpuRenderer {
     /// If the angle is not finite; then nothing changes.
     pub fn turn(&mut self, degrees: f64) -> Result<(), SettingError> {
         Interval::FINITE.check("degrees", degrees)?;
-        self.set_camera(self.scene.camera.turned(degrees))
+        self.set_camera(self.scene().camera.turned(degrees))
     }
 
     /// Asks for the depth at which every pixel's opacity reaches a value, above 0 and at most 1; `None` for none. Front to back only, and
     /// with culling at most [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold); not for
-    /// [`Compositing::Minimum`](crate::settings::Compositing::Minimum), and whatever the value that of the surface for
-    /// [`Compositing::Surface`](crate::settings::Compositing::Surface). See [`Self::first_hits`] and [`Self::pick`].
+    /// `minimum`, and whatever the value that of the surface for
+    /// `surface`. See [`Self::first_hits`] and [`Self::pick`].
     ///
     /// # Errors
     /// If the value is not in (0, 1]; then nothing changes.
@@ -223,7 +214,7 @@ impl CpuRenderer {
     /// # Errors
     /// If the frame has no first hits, or the pixel is off the image.
     pub fn pick(&self, pixel: [u32; 2]) -> Result<Option<Pick>, SettingError> {
-        FirstHits::pick(self.hits.as_ref(), (&self.volume, &self.transfer), pixel, &self.scene.image)
+        FirstHits::pick(self.hits.as_ref(), (&self.volume, &self.finished.transfer), pixel, &self.scene().image)
     }
 
     /// Draws a frame on the threads of the current rayon pool. Their number never changes a bit of the image.
@@ -232,8 +223,7 @@ impl CpuRenderer {
     /// If the scene exceeds a limit, such as the number of slabs.
     pub fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        let ImageSettings { width, height, .. } = self.scene.image;
-        self.draw_pixels(Region::whole([width, height]), start)
+        self.draw_pixels(Region::whole(self.finished.size()), start)
     }
 
     /// Draws the pixels of a region as [`Self::draw`] would: the returned image has the region's width and height, and counts are those of its work. It
@@ -243,8 +233,7 @@ impl CpuRenderer {
     /// As for [`Self::draw`], or if the region does not lie in the image.
     pub fn draw_region(&mut self, region: Region) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        let ImageSettings { width, height, .. } = self.scene.image;
-        region.check([width, height])?;
+        region.check(self.finished.size())?;
         self.draw_pixels(region, start)
     }
 
@@ -262,13 +251,13 @@ impl CpuRenderer {
     /// As for [`Self::draw`], if the scene has no parts, a host has set surfaces, or the window does not lie in the image.
     pub fn draw_part(&mut self, window: &Window) -> Result<(Part, Stats), RenderError> {
         let start = Instant::now();
-        part::check_sheets(&self.volume, &self.scene)?;
-        part::check(&self.volume, &self.scene, window)?;
+        part::check_sheets(&self.volume, self.scene())?;
+        part::check(&self.volume, self.scene(), window)?;
         if self.surfaces.is_some() {
             return Err(SettingError::new("surfaces", "a host's surfaces for a part of an image", "none").into());
         }
         let (Drawing { content, counts, .. }, view) = self.drawing(window.clone(), true)?;
-        let part = Part::new((&self.volume.clone().into(), &self.scene), &view, window, content)?;
+        let part = Part::new((&self.volume.clone().into(), self.scene()), &view, window, content)?;
         Ok((part, self.statistics(counts, start)))
     }
 
@@ -282,7 +271,7 @@ impl CpuRenderer {
         self.surfaces = closed.map(|closed| {
             // In front of everything.
             let depth = |&closed: &bool| if closed { f32::NEG_INFINITY } else { f32::INFINITY };
-            let (Region { x, y, width, .. }, [across, down]) = (window.region, self.size());
+            let (Region { x, y, width, .. }, [across, down]) = (window.region, self.finished.size());
             let mut depths = vec![f32::INFINITY; across as usize * down as usize];
             for (row, closed) in (y..).zip(closed.chunks_exact(width as usize)) {
                 let row = &mut depths[(x + row * across) as usize..][..width as usize];
@@ -296,26 +285,18 @@ impl CpuRenderer {
 
     /// The statistics of a frame that began at a time.
     fn statistics(&self, counts: Counts, start: Instant) -> Stats {
-        self.light.noted_in(statistics(self.simd, self.size(), counts, start))
-    }
-
-    /// The image's width and height.
-    fn size(&self) -> [u32; 2] {
-        [self.scene.image.width, self.scene.image.height]
+        self.light.noted_in(statistics(self.simd, self.finished.size(), counts, start))
     }
 
     /// Draws a window of the image, as pixels or as a part.
     fn drawing(&mut self, window: Window, is_part: bool) -> Result<(Drawing, ViewGeometry), RenderError> {
-        let splatting = &self.scene.splatting;
-        let is_cut = self.surfaces.is_some() || !self.scene.clip.is_empty();
-        splatting.check_rays(is_cut, self.first_hit)?;
-        let scene = self.scene.framed(&self.volume, &self.transfer);
-        let ImageSettings { width, height, .. } = self.scene.image;
-        let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, [width, height])?;
+        let is_cut = self.surfaces.is_some() || !self.scene().clip.is_empty();
+        self.scene().splatting.check_rays(is_cut, self.first_hit)?;
+        let (scene, view) = self.finished.framed(&self.volume, self.volume.grid())?;
         let window = if is_part { window.opened(&view.slabs_of(self.volume.grid())) } else { window };
         let first_hit = self.first_hit.filter(|_| !is_part);
-        let surfaces = self.surfaces_of([width, height])?;
-        let lights = self.light.lights((&self.volume, &self.transfer), &scene, &scene.camera)?;
+        let surfaces = self.surfaces_of(view.size)?;
+        let lights = self.light.lights((&self.volume, &self.finished.transfer), &scene, &scene.camera)?;
         let host = Host { window, is_part, first_hit, surfaces, lights };
         Ok((layer::draw(&mut self.layers, &scene, view, host, self.level), view))
     }

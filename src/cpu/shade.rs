@@ -103,7 +103,7 @@ impl Shader {
             diffuse: capped(shading.diffuse),
             specular: capped(shading.specular),
             shininess: capped(shading.shininess),
-            is_optical_depth: compositing == Compositing::Exponential,
+            is_optical_depth: compositing.is_optical_depth(),
         }
     }
 

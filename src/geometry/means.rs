@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::settings::splatting::{Classification, Compositing, Splatting};
+use crate::settings::splatting::Splatting;
 use crate::volume::Grid;
 
 /// A box around the centre of the volume, of which a grid may be a part.
@@ -20,11 +20,11 @@ pub struct RayBox {
 }
 
 impl RayBox {
-    /// The box for [`Compositing::Minimum`], in which kernels are complete, or for [`Compositing::Average`] and
+    /// The box for `minimum`, in which kernels are complete, or for `average` and
     /// [`Classification::After`], with all voxels; the other modes do not use it.
     pub fn new(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Self {
         let ((center, centers), near) = (grid.whole(), view.perspective.map_or(f64::NEG_INFINITY, |it| it.eye.near));
-        if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
+        if !splatting.compositing.counts_empty(splatting.classification) {
             return Self { center, half: centers + 0.5, nearest: near };
         }
         // The maximum depth by which a kernel reaches beyond a voxel at the near plane.
@@ -33,10 +33,10 @@ impl RayBox {
     }
 }
 
-/// The sheet depths whose slabs count for [`Compositing::Minimum`] even if they are empty: those on some ray's stretch. Empty for the
+/// The sheet depths whose slabs count for `minimum` even if they are empty: those on some ray's stretch. Empty for the
 /// other modes.
 pub fn covered(view: &ViewGeometry, grid: &Grid, splatting: &Splatting) -> Range<f64> {
-    if splatting.compositing != Compositing::Minimum || splatting.classification == Classification::After {
+    if !splatting.compositing.counts_empty(splatting.classification) {
         return 0.0..0.0;
     }
     let RayBox { center, half, nearest } = RayBox::new(view, grid, splatting);

@@ -1,6 +1,5 @@
 //! A volume under a transfer function on the GPU: its values, the voxels that take part (§5.1), and their changes.
 
-use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -26,13 +25,13 @@ use crate::settings::clip::ClippedVoxels;
 use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::{LabelTables, Ramp, Tables, TransferFunction};
 use crate::stats::Counts;
-use crate::volume::{Grid, Volume};
+use crate::volume::{Channels, Grid, Volume};
 
 /// The voxels of a volume that take part under a transfer function.
 #[derive(Debug)]
 pub struct ClassifiedVolume {
     volume: GpuVolume,
-    transfer: TransferFunction,
+    transfer: Channels<TransferFunction>,
     clipped: ClippedVoxels,
     /// The voxels that are drawn: one list for all channels if one splat draws a voxel in all of them, otherwise one for each channel that is drawn
     /// (SPEC §10).
@@ -74,7 +73,7 @@ impl ClassifiedVolume {
     pub fn new(
         device: &Device,
         volume: &GpuVolume,
-        mut transfer: TransferFunction,
+        mut transfer: Channels<TransferFunction>,
         clipped: ClippedVoxels,
         splatting: &Splatting,
     ) -> Self {
@@ -120,9 +119,9 @@ impl ClassifiedVolume {
         if let Some(given) = self.volume.given_lists() {
             return given.to_vec();
         }
-        let bricks = |(volume, transfer): (&Volume, Cow<'_, TransferFunction>)| match self.classification {
+        let bricks = |(volume, transfer): (&Volume, &[TransferFunction])| match self.classification {
             Classification::After => BrickList::new(volume.grid(), &[]),
-            _ => brick_list(volume, &transfer, &self.clipped),
+            _ => brick_list(volume, transfer, &self.clipped),
         };
         self.listed().map(bricks).collect()
     }
@@ -139,14 +138,10 @@ impl ClassifiedVolume {
     }
 
     /// What the voxels of each list take part in.
-    fn listed(&self) -> impl Iterator<Item = (&Volume, Cow<'_, TransferFunction>)> {
+    fn listed(&self) -> impl Iterator<Item = (&Volume, &[TransferFunction])> {
         let count = self.list_count();
         self.volume().channels().take(count).enumerate().map(move |(number, volume)| {
-            let transfer = match count {
-                1 => Cow::Borrowed(&self.transfer),
-                _ => Cow::Owned(self.transfer.of_channel(number)),
-            };
-            (volume, transfer)
+            (volume, if count == 1 { &*self.transfer } else { &self.transfer[number..=number] })
         })
     }
 
@@ -256,7 +251,7 @@ impl ClassifiedVolume {
     pub(crate) fn shades_by_label(&self, layer: &Layer) -> bool {
         let is_alone = layer.channels.len() == 1 && self.classification == Classification::Before;
         let matter = if is_alone { LabelTables::matter_to_shading } else { LabelTables::matter };
-        let mut channels = self.transfer.channels().skip(layer.channels.start).take(layer.channels.len());
+        let mut channels = self.transfer[layer.channels.clone()].iter();
         channels.any(|transfer| transfer.labels.values().any(matter))
     }
 
@@ -280,8 +275,8 @@ impl ClassifiedVolume {
         self.volume().grid()
     }
 
-    /// The transfer function.
-    pub fn transfer(&self) -> &TransferFunction {
+    /// The transfer functions of the channels that are drawn.
+    pub fn transfer(&self) -> &Channels<TransferFunction> {
         &self.transfer
     }
 
@@ -293,9 +288,10 @@ impl ClassifiedVolume {
     /// Changes colours, opacities, gradient opacity, iso-ranges or the labels' tables (§5.1). Only voxels that enter or leave are touched: those
     /// whose values become visible or transparent, found by binary search. If the gradient opacity changes, all voxels in range must be
     /// examined. The labels' tables are ignored if the volume is not segmented.
-    pub fn set_transfer_function(&mut self, mut transfer: TransferFunction) -> Touched {
+    pub fn set_transfer_function(&mut self, transfer: impl Into<Channels<TransferFunction>>) -> Touched {
+        let mut transfer = transfer.into();
         keep_what_applies(self.volume(), &mut transfer);
-        if transfer.further.len() != self.transfer.further.len() {
+        if transfer.len() != self.transfer.len() {
             let listed = |lists: &[BrickLists]| lists.iter().map(BrickLists::len).sum::<u64>();
             let old = listed(&self.lists);
             self.transfer = transfer;
@@ -306,17 +302,18 @@ impl ClassifiedVolume {
             self.transfer = transfer;
             return self.look_at_bricks();
         }
-        if !self.volume().further().is_empty() {
+        if self.volume().channel_count() > 1 {
             self.transfer = transfer;
             return self.look_at((0..self.volume().values().len() as u32).collect());
         }
-        let labels = self.transfer.labels.keys().chain(transfer.labels.keys()).copied().map(Some);
+        let (old, new) = (self.transfer.first(), transfer.first());
+        let labels = old.labels.keys().chain(new.labels.keys()).copied().map(Some);
         let mut labels: Vec<Option<u16>> = labels.chain([None]).collect();
         labels.sort_unstable();
         labels.dedup();
         // Voxels with other labels are examined too, without effect.
         let changed = ValueSet::union_of(
-            (labels.into_iter()).map(|label| changed_values(&self.transfer.tables(label), &transfer.tables(label))),
+            (labels.into_iter()).map(|label| changed_values(&old.tables(label), &new.tables(label))),
         );
         let candidates = if changed.ranges().is_empty() {
             Vec::new()
@@ -382,9 +379,9 @@ impl ClassifiedVolume {
 
     /// Decides for some voxels, in memory order, whether they enter or leave.
     fn look_at(&mut self, candidates: Vec<u32>) -> Touched {
-        let changes = |(listed, (volume, transfer)): (&BrickLists, (&Volume, Cow<'_, TransferFunction>))| {
+        let changes = |(listed, (volume, transfer)): (&BrickLists, (&Volume, &[TransferFunction]))| {
             // The closures get no types of wgpu, which in a browser belong to one thread.
-            let (clipped, listed, of) = (&self.clipped, listed.list(), TakingPart::new(volume, &transfer));
+            let (clipped, listed, of) = (&self.clipped, listed.list(), TakingPart::new(volume, transfer));
             let takes_part = |index: u32| clipped.contain(volume.grid().voxel_at(index)) && of.takes_part(index);
             let changed = candidates.par_iter().filter(|&&index| takes_part(index) != listed.contains(index));
             changed.copied().collect::<Vec<_>>().into_iter().partition(|&index| !listed.contains(index))
@@ -396,14 +393,16 @@ impl ClassifiedVolume {
     /// Changes only the iso-ranges: closed intervals `[lo, hi]` of the values that take part, `None` for all. Touches the same voxels as
     /// [`Self::set_transfer_function`].
     pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Touched {
-        self.set_transfer_function(TransferFunction { iso_ranges, ..self.transfer.clone() })
+        let mut transfer = self.transfer.clone();
+        transfer.first_mut().iso_ranges = iso_ranges;
+        self.set_transfer_function(transfer)
     }
 
     /// Shows or hides the voxels of a label. Touches the same voxels as [`Self::set_transfer_function`], and none if the volume is not
     /// segmented.
     pub fn set_label_visible(&mut self, label: u16, visible: bool) -> Touched {
         let mut transfer = self.transfer.clone();
-        transfer.labels.entry(label).or_default().visible = visible;
+        transfer.first_mut().labels.entry(label).or_default().visible = visible;
         self.set_transfer_function(transfer)
     }
 
@@ -457,12 +456,9 @@ impl Touched {
 }
 
 /// Drops the tables of labels of channels without labels, and the transfer functions of channels that a volume does not have.
-fn keep_what_applies(volume: &Volume, transfer: &mut TransferFunction) {
-    transfer.further.truncate(volume.further().len());
-    if volume.labels().is_none() {
-        transfer.labels.clear();
-    }
-    for (channel, transfer) in volume.further().iter().zip(&mut transfer.further) {
+fn keep_what_applies(volume: &Volume, transfer: &mut Channels<TransferFunction>) {
+    transfer.truncate(volume.channel_count());
+    for (channel, transfer) in volume.channels().zip(transfer.iter_mut()) {
         if channel.labels().is_none() {
             transfer.labels.clear();
         }

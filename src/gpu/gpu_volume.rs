@@ -331,7 +331,7 @@ fn check_count(volume: &Volume) -> Result<(), SettingError> {
 
 /// The values of all channels, one channel after the other, if there are several.
 fn joined_values(volume: &Volume) -> Option<Vec<f32>> {
-    let are_several = !volume.further().is_empty();
+    let are_several = volume.channel_count() > 1;
     are_several.then(|| volume.channels().flat_map(Volume::values).collect())
 }
 

@@ -43,8 +43,8 @@ impl Shaded {
 }
 
 /// The voxels of each channel that have such normals, if any voxel has.
-pub(crate) fn shaded(volume: &Volume, transfer: &TransferFunction) -> Option<Vec<Shaded>> {
-    let channels: Vec<Shaded> = volume.channels().zip(transfer.channels()).map(Shaded::of).collect();
+pub(crate) fn shaded(volume: &Volume, transfer: &[TransferFunction]) -> Option<Vec<Shaded>> {
+    let channels: Vec<Shaded> = volume.channels().zip(transfer).map(Shaded::of).collect();
     channels.iter().any(|shaded| *shaded != Shaded::Nothing).then_some(channels)
 }
 

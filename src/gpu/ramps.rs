@@ -69,13 +69,13 @@ pub struct Integration<'a> {
 impl Ramps {
     /// The ramps of a volume of one channel; a missing gradient opacity is 1 everywhere.
     pub fn new(transfer: &TransferFunction) -> Self {
-        Self::of_channels(transfer, &[Stored::ALONE], 0, None)
+        Self::of_channels(std::slice::from_ref(transfer), &[Stored::ALONE], 0, None)
     }
 
-    /// The ramps of as many of a transfer function's channels as are stored, from the first one on, whose number in the volume is given. With tables of
+    /// The ramps of as many channels as are stored, given the number of the first one in the volume. With tables of
     /// the ramps' integrals for classification after splatting.
     pub fn of_channels(
-        transfer: &TransferFunction,
+        transfer: &[TransferFunction],
         stored: &[Stored],
         first_channel: u32,
         integration: Option<Integration<'_>>,
@@ -86,7 +86,7 @@ impl Ramps {
         let matter = |tables: &LabelTables| if only_shades { tables.matter_to_shading() } else { tables.matter() };
         let (mut points, mut cells, mut search_steps) = (Vec::new(), 0, 0);
         let (mut mains, mut all, mut labelled) = (Vec::new(), Vec::new(), Vec::new());
-        for (number, (transfer, stored)) in transfer.channels().zip(stored).enumerate() {
+        for (number, (transfer, stored)) in transfer.iter().zip(stored).enumerate() {
             let mut append = |points: &mut Vec<[f32; 4]>, label| {
                 let tables = transfer.tables(label);
                 let bounds = append(points, &tables, is_alone);

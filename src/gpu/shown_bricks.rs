@@ -45,12 +45,12 @@ impl PartialEq for BrickNeeds {
 
 /// The voxels of each channel of a volume that a frame may draw.
 #[cfg(not(target_arch = "wasm32"))]
-pub(crate) fn shown_lists(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Vec<BrickList> {
+pub(crate) fn shown_lists(volume: &Volume, transfer: &[TransferFunction], needs: &BrickNeeds) -> Vec<BrickList> {
     ShownBricks::new(volume, transfer, needs).lists(volume)
 }
 
 impl ShownBricks {
-    pub(super) fn new(volume: &Volume, transfer: &TransferFunction, needs: &BrickNeeds) -> Self {
+    pub(super) fn new(volume: &Volume, transfer: &[TransferFunction], needs: &BrickNeeds) -> Self {
         let mut shown = Self { needs: needs.clone(), ranges: Vec::new(), values: opaque_values(volume, transfer) };
         for (number, channel) in volume.channels().enumerate().take(shown.values.len()) {
             let coefficients = needs.of_channel(number, channel);
@@ -72,7 +72,7 @@ impl ShownBricks {
 }
 
 /// The values that have an opacity in each channel that is drawn. While they stay the same, so do the voxels that may be drawn.
-pub(super) fn opaque_values(volume: &Volume, transfer: &TransferFunction) -> Vec<ValueSet> {
+pub(super) fn opaque_values(volume: &Volume, transfer: &[TransferFunction]) -> Vec<ValueSet> {
     channels(volume, transfer).map(|(channel, transfer)| values_of(channel, transfer)).collect()
 }
 

@@ -22,7 +22,7 @@ use crate::scene::image_settings::premultiplied;
 use crate::settings::clip::{CutCells, HalfSpace, MAX_PLANES};
 use crate::settings::closing::Closing;
 use crate::settings::shading::{Light, MAX_SHADING, MIN_GRADIENT, Shading};
-use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
+use crate::settings::splatting::Splatting;
 use crate::settings::window::Window;
 use crate::volume::Grid;
 
@@ -72,11 +72,13 @@ pub fn frame(
         section_width: view.section_width() as f32,
         near: eye.map_or(0.0, |eye| eye.near) as f32,
         pixel_per_depth: eye.map_or(view.pix, |eye| eye.pixel_per_depth) as f32,
-        opacity_threshold: opacity_threshold(&scene.splatting) as f32,
+        opacity_threshold: scene.splatting.opaque_from() as f32,
         compositing: scene.splatting.compositing as u32,
         order: scene.splatting.order as u32,
-        culling: u32::from(scene.splatting.culling && hides(&scene.splatting)),
-        tiles: u32::from(scene.splatting.tiles && !counts_empty_tiles(&scene.splatting)),
+        culling: u32::from(scene.splatting.culling && scene.splatting.hides()),
+        tiles: u32::from(
+            scene.splatting.tiles && !scene.splatting.compositing.counts_empty(scene.splatting.classification),
+        ),
         per_unit: grid.unit().recip().sqrt().min(f32::MAX.into()) as f32,
         headlight: u32::from(scene.shading.light == Light::Headlight),
         first_channel: ramps.first_channel,
@@ -114,7 +116,7 @@ pub fn gather(
 ) -> Gather {
     let economies = splatting.experimental;
     // Only what lies behind a surface is culled.
-    let has_beta = hides(splatting) && splatting.compositing != Compositing::Surface && economies.beta < 1.0;
+    let has_beta = splatting.hides() && !splatting.compositing.has_surface() && economies.beta < 1.0;
     let whole = kernel.section(0.0, -kernel.radius(), kernel.radius());
     let support_squared = kernel.support().powi(2);
     let in_f32 = |numbers: [f64; 4]| numbers.map(|x| x as f32);
@@ -271,7 +273,7 @@ fn group_of(half_box: DVec2, splatting: &Splatting, near: f64) -> SheetGroup {
         half_box: in_f32_pixels(half_box),
         // A footprint's box contains this many pixel centres, plus or minus one.
         box_filter: ((2.0 * half_box.min(DVec2::splat(MAX_HALF_BOX))).floor() - 1.0).as_uvec2().to_array(),
-        culling: u32::from(splatting.culling && hides(splatting) && half_box.max_element() <= MAX_HALF_BOX),
+        culling: u32::from(splatting.culling && splatting.hides() && half_box.max_element() <= MAX_HALF_BOX),
         near: near as f32,
         first_brick: 0,
         brick_count: 0,
@@ -288,21 +290,6 @@ pub fn in_f32_pixels(half_box: DVec2) -> [f32; 2] {
 
 /// Half the largest box that is tested, in pixels. Few larger footprints fit the screen, and they are hardly ever hidden.
 const MAX_HALF_BOX: f64 = 256.0;
-
-/// Whether tiles without splats count: before splatting, empty sheets are minima.
-fn counts_empty_tiles(splatting: &Splatting) -> bool {
-    splatting.compositing == Compositing::Minimum && splatting.classification == Classification::Before
-}
-
-/// Whether what is drawn hides what comes later (SPEC §5): front to back, with a compositing that hides.
-fn hides(splatting: &Splatting) -> bool {
-    splatting.order == Order::FrontToBack && splatting.compositing.hides()
-}
-
-/// The opacity from which pixels count as opaque. While no surface has been reached, alpha is below one half; a surface itself is opaque.
-fn opacity_threshold(splatting: &Splatting) -> f64 {
-    if splatting.compositing == Compositing::Surface { 1.0 } else { splatting.opacity_threshold }
-}
 
 /// `hv = normalize(l + c)`; 0 where they cancel (SPEC §3).
 fn half_vector(to_light: DVec3, to_eye: DVec3) -> DVec3 {

@@ -37,11 +37,13 @@ pub(super) fn content(
         Joining::Nearest.finish(&mut colors, [0.0; 4]);
     }
     let extremes = match (chosen, frame.first_drawing().and_then(Drawing::carried)) {
-        (Some(Compositing::Average), Some(carried)) => means((device, queue), frame, carried, region, &mut colors)?,
+        (Some(chosen), Some(carried)) if chosen.is_average() => {
+            means((device, queue), frame, carried, region, &mut colors)?
+        }
         (Some(_), Some(carried)) => extremes((device, queue), frame, carried, region, &colors)?,
         _ => Vec::new(),
     };
-    if chosen == Some(Compositing::Minimum) {
+    if chosen.is_some_and(Compositing::keeps_least) {
         // The buffer holds 2 minus the opacity, 0 for none.
         let drawn = colors.iter_mut().filter(|color| color[3] != 0.0);
         drawn.for_each(|color| color[3] = 2.0 - color[3]);

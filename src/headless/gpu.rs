@@ -25,7 +25,7 @@ use crate::pick::Pick;
 use crate::renderer::Renderer;
 use crate::renderer::scene_view::SceneView;
 use crate::scene::{ImageSettings, Scene};
-use crate::settings::splatting::{Classification, Compositing, Splatting};
+use crate::settings::splatting::Splatting;
 use crate::settings::window::Window;
 use crate::stats::Stats;
 use crate::volume::Volume;
@@ -205,8 +205,7 @@ impl GpuHeadless {
         let counts = view.counts();
         let frame = view.frame.as_ref().ok_or_else(no_frame)?;
         let Splatting { compositing, classification, .. } = view.scene.splatting;
-        let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average);
-        let chosen = (is_choice && classification == Classification::After).then_some(compositing);
+        let chosen = compositing.chooses_values(classification).then_some(compositing);
         let content = content::content((&self.device, &self.queue), frame, &window.region, chosen)?;
         let stats = self.stats(view, counts, 0, [prepare_ms, milliseconds_since(start)])?;
         Ok((content, stats))

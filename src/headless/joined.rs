@@ -16,7 +16,7 @@ use crate::rendering::Rendering;
 use crate::scene::{ImageSettings, OpenVolume, Scene};
 use crate::settings::window::Window;
 use crate::stats::{Counts, Stats, StoreCounts};
-use crate::volume::StreamedVolume;
+use crate::volume::{Channels, StreamedVolume};
 
 /// Draws a frame of channels whose images add up, of a volume that is streamed.
 pub(super) fn draw(
@@ -55,9 +55,11 @@ pub(super) fn draw_part(
             return Ok(None);
         };
         let (drawn, stats) = headless.draw_part(view, window)?;
-        contents.push(drawn.content);
+        contents.extend(drawn.contents);
         Ok(Some(stats))
     })?;
+    // A volume has a channel.
+    let contents = Channels::of(contents).unwrap_or_else(|| Content::default().into());
     Ok((Part::named(identity, window.clone(), contents), stats))
 }
 
@@ -79,7 +81,7 @@ fn each_channel(
         Some(light) => Some((light.clone(), Noted::Nothing)),
         None => GivenLight::of_channels((volume, explicit), headless.backend())?,
     };
-    for (number, transfer) in explicit.resolve(volume.sample()).channels().enumerate() {
+    for (number, transfer) in explicit.resolve(volume.sample()).iter().enumerate() {
         if opaque_values(transfer).ranges().is_empty() {
             draw(None)?;
             continue;

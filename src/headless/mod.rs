@@ -28,7 +28,7 @@ use self::given_light::GivenLight;
 pub use self::gpu::GpuHeadless;
 pub use self::options::HeadlessOptions;
 use self::reference::ReferenceView;
-use self::timed::{load_and_render, view_and_draw};
+use self::timed::{load_and_render, opened, view_and_draw};
 pub use self::view::HeadlessView;
 use self::view::ViewBackend;
 #[cfg(feature = "cpu")]
@@ -123,8 +123,7 @@ impl Headless {
     /// the image, or the device fails.
     #[doc(alias = "Scene::part")]
     pub fn render_part(&self, scene: &Scene, window: &Window) -> Result<Part, Error> {
-        scene.check().map_err(RenderError::from)?;
-        let volume = scene.open_volume()?;
+        let volume = opened(scene, Scene::open_volume)?;
         let mut view = self.view(volume, scene)?;
         Ok(self.draw_part(&mut view, window)?.0)
     }

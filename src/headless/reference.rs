@@ -9,14 +9,14 @@ use super::timed::milliseconds_since;
 use super::{Backend, Rendering};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
+use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::part::{self, Content, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::reference::{self, Host, Lights};
-use crate::scene::{ImageSettings, Scene};
+use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::splatting::check_first_hit;
-use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::Stats;
 use crate::volume::Volume;
@@ -25,8 +25,7 @@ use crate::volume::Volume;
 #[derive(Clone, Debug)]
 pub(super) struct ReferenceView {
     volume: Arc<Volume>,
-    scene: Scene,
-    transfer: TransferFunction,
+    finished: FinishedScene,
     first_hit: Option<f64>,
     hits: Option<FirstHits>,
     /// Light that is made elsewhere.
@@ -38,11 +37,8 @@ impl ReferenceView {
     /// If a setting of the scene is invalid, or the volume lacks what the transfer function needs.
     pub(super) fn new(volume: impl Into<Arc<Volume>>, scene: &Scene) -> Result<Self, RenderError> {
         let volume = volume.into();
-        scene.check()?;
-        scene.check_volume(&volume)?;
-        let scene = scene.settled(&volume);
-        let transfer = scene.resolve(&volume);
-        Ok(Self { scene, volume, transfer, first_hit: None, hits: None, light: None })
+        let finished = FinishedScene::new(&volume, scene)?;
+        Ok(Self { volume, finished, first_hit: None, hits: None, light: None })
     }
 
     pub(super) fn volume(&self) -> &Arc<Volume> {
@@ -50,7 +46,7 @@ impl ReferenceView {
     }
 
     pub(super) fn scene(&self) -> &Scene {
-        &self.scene
+        &self.finished.scene
     }
 
     /// Draws parts in light that is made elsewhere.
@@ -65,9 +61,7 @@ impl ReferenceView {
     }
 
     pub(super) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
-        camera.check()?;
-        self.scene.camera = camera;
-        Ok(())
+        self.finished.set_camera(camera)
     }
 
     pub(super) fn set_first_hit(&mut self, opacity: Option<f64>) -> Result<(), SettingError> {
@@ -77,31 +71,30 @@ impl ReferenceView {
     }
 
     pub(super) fn pick(&self, pixel: [u32; 2]) -> Result<Option<Pick>, SettingError> {
-        FirstHits::pick(self.hits.as_ref(), (&self.volume, &self.transfer), pixel, &self.scene.image)
+        FirstHits::pick(self.hits.as_ref(), (&self.volume, &self.finished.transfer), pixel, &self.scene().image)
     }
 
     /// Draws a part of the image.
     pub(super) fn draw_part(&self, window: &Window) -> Result<(Part, Stats), RenderError> {
-        part::check(&self.volume, &self.scene, window)?;
+        part::check(&self.volume, self.scene(), window)?;
         let (content, view, stats) = self.draw_content(window)?;
-        Ok((Part::new((&self.volume.clone().into(), &self.scene), &view, window, content)?, stats))
+        Ok((Part::new((&self.volume.clone().into(), self.scene()), &view, window, content)?, stats))
     }
 
     /// Draws the pixels of a part, and returns them with their view and statistics.
     pub(super) fn draw_content(&self, window: &Window) -> Result<(Content, ViewGeometry, Stats), RenderError> {
         let start = Instant::now();
-        let Self { volume, scene, transfer, .. } = self;
-        let framed = scene.framed(volume, transfer);
-        let ImageSettings { width, height, .. } = scene.image;
-        let view = ViewGeometry::new(volume.grid(), &framed.camera, &framed.splatting, [width, height])?;
+        let Self { volume, finished: FinishedScene { scene, transfer }, .. } = self;
+        let (_, view) = self.finished.framed(volume, volume.grid())?;
         let opened = window.opened(&view.slabs_of(volume.grid()));
-        let content = reference::lit_part(volume, transfer, (scene, self.light.as_ref()), &opened)?;
+        let content = reference::part(volume, transfer, (scene, self.light.as_ref()), &opened)?;
         Ok((content, view, self.stats(start)?))
     }
 
     pub(super) fn draw(&mut self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        let Self { volume, scene, transfer, first_hit, .. } = self;
+        let Self { volume, finished, first_hit, .. } = self;
+        let FinishedScene { scene, transfer } = &*finished;
         if first_hit.is_some() {
             scene.splatting.check_rays(!scene.clip.is_empty(), *first_hit)?;
         }
@@ -109,10 +102,8 @@ impl ReferenceView {
         let drawn = reference::render_for(host, volume, transfer, scene, None)?;
         let image = drawn.image;
         if first_hit.is_some() {
-            let framed = scene.framed(volume, transfer);
-            let grid = volume.grid();
-            let view = ViewGeometry::new(grid, &framed.camera, &framed.splatting, [image.width, image.height])?;
-            let depths = drawn.first_hits.iter().map(|depth| (depth * grid.unit()) as f32).collect();
+            let (_, view) = finished.framed(volume, volume.grid())?;
+            let depths = drawn.first_hits.iter().map(|depth| (depth * volume.grid().unit()) as f32).collect();
             self.hits = Some(FirstHits { view, region: Region::whole(view.size), depths });
         } else {
             self.hits = None;
@@ -129,10 +120,10 @@ impl ReferenceView {
             backend: Backend::Reference.name().to_owned(),
             api: "none".to_owned(),
             rasterizer: Backend::Reference.name().to_owned(),
-            width: self.scene.image.width,
-            height: self.scene.image.height,
+            width: self.scene().image.width,
+            height: self.scene().image.height,
             frame_ms: milliseconds_since(start),
-            counts: reference::count(&self.volume, &self.transfer, &self.scene)?,
+            counts: reference::count(&self.volume, &self.finished.transfer, self.scene())?,
             ..Stats::default()
         })
     }

@@ -14,14 +14,18 @@ pub(super) fn load_and_render<V>(
     open: impl FnOnce(&Scene) -> Result<V, VolumeError>,
     render_volume: impl FnOnce(V) -> Result<Rendering, RenderError>,
 ) -> Result<Rendering, Error> {
-    // An invalid scene is refused before its volume is read.
-    scene.check().map_err(RenderError::from)?;
     let start = Instant::now();
-    let volume = open(scene)?;
+    let volume = opened(scene, open)?;
     let load_ms = milliseconds_since(start);
     let mut rendering = render_volume(volume)?;
     rendering.stats.load_ms = load_ms;
     Ok(rendering)
+}
+
+/// Opens a scene's volume. An invalid scene is refused before its volume is read.
+pub(super) fn opened<V>(scene: &Scene, open: impl FnOnce(&Scene) -> Result<V, VolumeError>) -> Result<V, Error> {
+    scene.check().map_err(RenderError::from)?;
+    Ok(open(scene)?)
 }
 
 /// Sets up a view and draws its first frame; the statistics count the set-up as preparation.

@@ -15,7 +15,7 @@ use crate::renderer::scene_view::SceneView;
 use crate::scene::{OpenVolume, Scene};
 use crate::settings::camera::Camera;
 use crate::stats::StoreCounts;
-use crate::stored_light::StoredLight;
+use crate::stored_light::{StoredLight, explicit};
 
 /// A view of a volume for any number of frames, made by [`Headless::view`](super::Headless::view). Frames share the sorted lists.
 #[derive(Debug)]
@@ -151,9 +151,8 @@ impl HeadlessView {
     /// If a setting is not allowed, or stored light comes from elsewhere for this camera; then nothing changes.
     pub fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
         if let Some((light, _)) = &self.stored {
-            camera.check()?;
             let turned = Scene { camera, ..self.scene().clone() };
-            light.check(&turned.explicit(self.volume().sample()))?;
+            light.check(&explicit(&self.volume(), &turned)?)?;
         }
         match &mut self.backend {
             #[cfg(feature = "gpu")]
@@ -179,8 +178,8 @@ impl HeadlessView {
     /// Records, for [`Headless::pick`](super::Headless::pick), the depth at which each pixel's opacity reaches a value in (0, 1]; `None` records
     /// no depth. It needs front-to-back order and, with culling, at most
     /// [`Splatting::opacity_threshold`](crate::settings::Splatting::opacity_threshold).
-    /// [`Compositing::Minimum`](crate::settings::Compositing::Minimum) has no first hits; for
-    /// [`Compositing::Surface`](crate::settings::Compositing::Surface) the depth is the surface's, whatever the value.
+    /// `minimum` has no first hits; for
+    /// `surface` the depth is the surface's, whatever the value.
     ///
     /// # Errors
     /// If the value is not in (0, 1], or the volume is read while it is drawn; then nothing changes.

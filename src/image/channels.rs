@@ -15,13 +15,21 @@ pub(crate) enum Joining {
 }
 
 impl Joining {
+    /// For some channels; `None` where they share sheets, or there is one.
+    pub(crate) fn of_channels(count: usize, compositing: Compositing, classification: Classification) -> Option<Self> {
+        Self::of(compositing, classification).filter(|_| count > 1)
+    }
+
     /// `None` where channels share sheets.
     pub(crate) fn of(compositing: Compositing, classification: Classification) -> Option<Self> {
-        match compositing {
-            Compositing::Maximum | Compositing::Minimum | Compositing::Average => Some(Self::Sum),
-            Compositing::Surface if classification == Classification::After => Some(Self::Nearest),
-            _ => None,
-        }
+        let has_surface = compositing.has_surface() && classification == Classification::After;
+        if compositing.is_choice() { Some(Self::Sum) } else { has_surface.then_some(Self::Nearest) }
+    }
+
+    /// The opacity whose depth is asked of every channel, if a host asks for one of the image: the nearest surface is the one with the nearest first hit, for
+    /// any opacity.
+    pub(crate) fn first_hit(self, asked: Option<f64>) -> Option<f64> {
+        asked.or((self == Self::Nearest).then_some(1.0))
     }
 
     /// Adds a channel's pixels, which have no background, to those of the channels before it. First hits become the nearest ones; they may be

@@ -36,7 +36,7 @@ pub struct KeptLight {
 /// Matter, and what it depends on.
 #[derive(Clone, Debug)]
 struct KeptMatter {
-    transfer: TransferFunction,
+    transfer: Vec<TransferFunction>,
     clip: Clip,
     matter: LightMatter,
 }
@@ -54,7 +54,7 @@ impl KeptLight {
     /// If sheets would take more than 4 GiB.
     pub fn lights(
         &mut self,
-        (volume, transfer): (&Volume, &TransferFunction),
+        (volume, transfer): (&Volume, &[TransferFunction]),
         scene: &Scene,
         camera: &Camera,
     ) -> Result<Option<Arc<Lights>>, RenderError> {
@@ -66,13 +66,13 @@ impl KeptLight {
         if let Some(given) = &self.given {
             return Ok(Some(Arc::new(given.on(volume.grid()))));
         }
-        let is_same = |kept: &KeptMatter| kept.transfer == *transfer && kept.clip == scene.clip;
+        let is_same = |kept: &KeptMatter| kept.transfer == transfer && kept.clip == scene.clip;
         let matter = match self.matter.take().filter(is_same) {
             Some(kept) => kept,
             None => {
                 self.sheets = [None, None];
                 let matter = LightMatter::new(volume, transfer, &scene.clip);
-                KeptMatter { transfer: transfer.clone(), clip: scene.clip.clone(), matter }
+                KeptMatter { transfer: transfer.to_vec(), clip: scene.clip.clone(), matter }
             }
         };
         let matter = &self.matter.insert(matter).matter;
@@ -123,7 +123,7 @@ impl KeptLight {
     /// As for [`Self::lights`].
     #[cfg(feature = "gpu")]
     pub(crate) fn extent(
-        (volume, transfer): (&Volume, &TransferFunction),
+        (volume, transfer): (&Volume, &[TransferFunction]),
         scene: &Scene,
         camera: &Camera,
     ) -> Result<[u32; 2], RenderError> {

@@ -32,12 +32,12 @@ pub struct LightMatter {
 
 impl LightMatter {
     /// The matter of a volume under a transfer function and cuts.
-    pub fn new(volume: &Volume, transfer: &TransferFunction, clip: &Clip) -> Self {
+    pub fn new(volume: &Volume, transfer: &[TransferFunction], clip: &Clip) -> Self {
         let bricks = lit_bricks(volume, transfer, clip).bricks().to_vec();
-        let is_by_value = volume.further().is_empty()
+        let is_by_value = volume.channel_count() == 1
             && volume.labels().is_none()
             && volume.colors().is_none()
-            && transfer.gradient_opacity.is_none();
+            && transfer.iter().all(|transfer| transfer.gradient_opacity.is_none());
         let of_bricks = |bricks: &[Brick], amounts: &mut [[f32; SLOTS]]| {
             // Most volumes have few values.
             let mut known = [(f32::NAN, 0.0); KNOWN];
@@ -68,13 +68,13 @@ impl LightMatter {
 }
 
 /// The bricks of the voxels that take part and whose centres no cut leaves out.
-pub(super) fn lit_bricks(volume: &Volume, transfer: &TransferFunction, clip: &Clip) -> BrickList {
+pub(super) fn lit_bricks(volume: &Volume, transfer: &[TransferFunction], clip: &Clip) -> BrickList {
     // Kernels without extent: their centres decide.
     brick_list(volume, transfer, &clip.voxels(volume.grid(), 0.0))
 }
 
 /// `-ln(1 - min(α, 0.9999))` of a voxel, summed over all channels.
-fn amount(volume: &Volume, transfer: &TransferFunction, voxel: UVec3) -> f64 {
+fn amount(volume: &Volume, transfer: &[TransferFunction], voxel: UVec3) -> f64 {
     let index = volume.grid().index_of(voxel);
     let of_channel = |(volume, transfer): (&Volume, &TransferFunction)| {
         let value = f64::from(volume.values().at(index as usize));

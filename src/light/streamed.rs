@@ -56,7 +56,7 @@ impl StreamedLight {
             size_of::<f32>() + labels + colors
         };
         // Beside the values, their amounts.
-        let of_voxel = volume.channels().map(bytes_of).sum::<usize>() + size_of::<f32>();
+        let of_voxel = volume.channels.iter().map(bytes_of).sum::<usize>() + size_of::<f32>();
         let sheets = side.powi(3) * (size_of::<f32>() * stacks) as f64;
         let needed = grid.voxels() as f64 * of_voxel as f64 + sheets;
         let allowed = (volume.memory / SHARE) as f64;
@@ -82,7 +82,7 @@ impl StreamedLight {
     /// If the store cannot be read, or sheets would take more than 4 GiB.
     pub fn lights(
         &self,
-        (volume, transfer): (&StreamedVolume, &TransferFunction),
+        (volume, transfer): (&StreamedVolume, &[TransferFunction]),
         scene: &Scene,
     ) -> Result<Option<Arc<Lights>>, RenderError> {
         if scene.shading.light_key().is_none() {

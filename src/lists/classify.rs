@@ -10,14 +10,14 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
 /// The indices of the voxels that take part, in memory order.
-pub fn classify(volume: &Volume, transfer: &TransferFunction, clipped: &ClippedVoxels) -> Vec<u32> {
+pub fn classify(volume: &Volume, transfer: &[TransferFunction], clipped: &ClippedVoxels) -> Vec<u32> {
     let mut voxels = brick_list(volume, transfer, clipped).voxels();
     voxels.sort_unstable();
     voxels
 }
 
 /// The bricks of the voxels that take part.
-pub fn brick_list(volume: &Volume, transfer: &TransferFunction, clipped: &ClippedVoxels) -> BrickList {
+pub fn brick_list(volume: &Volume, transfer: &[TransferFunction], clipped: &ClippedVoxels) -> BrickList {
     let taking_part = TakingPart::new(volume, transfer);
     let row_of = |y: u32, z: u32| volume.dims().x * (y + volume.dims().y * z);
     BrickList::by_rows(volume.grid(), &|y, z, flags: &mut [bool]| {
@@ -36,9 +36,9 @@ pub fn in_rows(volume: &Volume, pick: impl Fn(u32, u32, u32) -> Vec<u32> + Sync)
 /// The channels that are drawn (SPEC §10), each with its transfer function.
 pub fn channels<'a>(
     volume: &'a Volume,
-    transfer: &'a TransferFunction,
+    transfer: &'a [TransferFunction],
 ) -> impl Iterator<Item = (&'a Volume, &'a TransferFunction)> {
-    volume.channels().zip(transfer.channels())
+    volume.channels().zip(transfer)
 }
 
 /// Tells of voxels that are not clipped whether they take part: in any channel they are no holes, visible, inside an iso-range, and have an opacity above 0,
@@ -63,7 +63,7 @@ struct InChannel<'a> {
 
 impl<'a> TakingPart<'a> {
     /// Prepares the decision.
-    pub fn new(volume: &'a Volume, transfer: &'a TransferFunction) -> Self {
+    pub fn new(volume: &'a Volume, transfer: &'a [TransferFunction]) -> Self {
         Self { channels: channels(volume, transfer).map(InChannel::of).collect() }
     }
 
@@ -121,6 +121,7 @@ impl<'a> InChannel<'a> {
 #[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use std::collections::BTreeMap;
+    use std::slice::from_ref;
 
     use glam::{DVec3, UVec3};
 
@@ -173,17 +174,17 @@ mod tests {
             ]),
             ..by_value.clone()
         };
-        let of_two = TransferFunction { further: vec![graded.clone()], ..by_value.clone() };
+        let of_two = [by_value.clone(), graded.clone()];
         let cut = Clip { planes: vec![[0.5, -0.3, 0.4, 0.2]], ..Clip::default() };
         for (name, volume, transfer) in [
-            ("values", &volume(whole(0)), &by_value),
-            ("holes", &volume(holed.collect()), &by_value),
-            ("gradients", &volume(whole(4)), &graded),
-            ("iso-ranges", &volume(whole(6)), &in_range),
-            ("labels", &labelled, &of_labels),
-            ("unused labels", &labelled, &by_value),
-            ("channels", &two, &of_two),
-            ("colours", &colored, &by_value),
+            ("values", &volume(whole(0)), from_ref(&by_value)),
+            ("holes", &volume(holed.collect()), from_ref(&by_value)),
+            ("gradients", &volume(whole(4)), from_ref(&graded)),
+            ("iso-ranges", &volume(whole(6)), from_ref(&in_range)),
+            ("labels", &labelled, from_ref(&of_labels)),
+            ("unused labels", &labelled, from_ref(&by_value)),
+            ("channels", &two, &of_two[..]),
+            ("colours", &colored, from_ref(&by_value)),
         ] {
             for clip in [&Clip::default(), &cut] {
                 let clipped = clip.voxels(volume.grid(), 2.0);

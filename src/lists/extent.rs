@@ -12,7 +12,7 @@ use crate::volume::Volume;
 /// them. `None` if no voxel takes part.
 pub(crate) fn of_voxels(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     clipped: &ClippedVoxels,
     specks: f64,
 ) -> Option<[UVec3; 2]> {
@@ -43,7 +43,7 @@ pub(crate) fn of_voxels(
 /// none is there.
 pub(crate) fn farthest(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     clipped: &ClippedVoxels,
     [first, last]: [UVec3; 2],
 ) -> f64 {
@@ -114,7 +114,7 @@ mod tests {
         let block = [UVec3::new(4, 3, 6), UVec3::new(20, 13, 16)];
         let specks = [UVec3::new(1, 19, 0), UVec3::new(29, 0, 24)];
         let volume = volume(block, &specks);
-        let of = |share| of_voxels(&volume, &transfer(), &ClippedVoxels::default(), share);
+        let of = |share| of_voxels(&volume, &[transfer()], &ClippedVoxels::default(), share);
         // Of 17·11·11 + 2 = 2059 voxels, 0.1 % are two: one speck is ignored at either end.
         assert_eq!(of(0.001), Some(block));
         assert_eq!(of(0.0004), Some([UVec3::new(1, 0, 0), UVec3::new(29, 19, 24)]));
@@ -128,7 +128,7 @@ mod tests {
         let specks = [UVec3::new(1, 8, 11), UVec3::new(29, 0, 24)];
         let volume = volume(block, &specks);
         let of = |bounds: [UVec3; 2], clip: Clip| {
-            let found = farthest(&volume, &transfer(), &clip.voxels(volume.grid(), 2.0), bounds);
+            let found = farthest(&volume, &[transfer()], &clip.voxels(volume.grid(), 2.0), bounds);
             let middle = (bounds[0] + bounds[1]).as_dvec3() / 2.0;
             (found, middle)
         };
@@ -148,17 +148,17 @@ mod tests {
     fn cuts_iso_ranges_and_gradients_rule_voxels_out() {
         let block = [UVec3::new(4, 3, 6), UVec3::new(20, 13, 16)];
         let volume = volume(block, &[]);
-        let of = |transfer: &TransferFunction, clip: Clip| {
+        let of = |transfer: &[TransferFunction], clip: Clip| {
             of_voxels(&volume, transfer, &clip.voxels(volume.grid(), 2.0), 0.0)
         };
-        assert_eq!(of(&transfer(), Clip::default()), Some(block));
+        assert_eq!(of(&[transfer()], Clip::default()), Some(block));
         // x ≥ 0 keeps the kernels of voxels from 14.5 - 2 on.
         let clip = Clip { planes: vec![[1.0, 0.0, 0.0, 0.0]], ..Clip::default() };
-        assert_eq!(of(&transfer(), clip), Some([UVec3::new(13, 3, 6), block[1]]));
+        assert_eq!(of(&[transfer()], clip), Some([UVec3::new(13, 3, 6), block[1]]));
         let nothing = TransferFunction { iso_ranges: Some(vec![[200.0, 300.0]]), ..transfer() };
-        assert_eq!(of(&nothing, Clip::default()), None);
+        assert_eq!(of(&[nothing], Clip::default()), None);
         let flat = Ramp::new(vec![(0.0, 1.0), (10.0, 0.0)]).unwrap();
         let inner = TransferFunction { gradient_opacity: Some(flat), ..transfer() };
-        assert_eq!(of(&inner, Clip::default()), Some([block[0] + 1, block[1] - 1]));
+        assert_eq!(of(&[inner], Clip::default()), Some([block[0] + 1, block[1] - 1]));
     }
 }

@@ -175,7 +175,6 @@ mod tests {
             membership: false,
             iso_ranges: iso_ranges.map(<[[f64; 2]]>::to_vec),
             labels: BTreeMap::new(),
-            further: Vec::new(),
         }
     }
 

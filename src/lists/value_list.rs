@@ -74,7 +74,6 @@ mod tests {
                 membership: false,
                 iso_ranges: Some(vec![iso_range]),
                 labels: BTreeMap::new(),
-                further: Vec::new(),
             });
             let mut found = list.within((&values).into(), &set);
             assert!(found.is_sorted_by_key(|&voxel| values[voxel as usize]));

@@ -28,7 +28,7 @@ pub(super) fn channel_names(identity: &Identity) -> Vec<String> {
 /// The pixels of a part, channel by channel.
 pub(super) fn to_channels(part: &Part) -> Vec<Vec<f32>> {
     let per_image = channel_names(&part.identity).len() / part.identity.images;
-    part.contents().flat_map(|of_image| to_channels_of(of_image).into_iter().take(per_image)).collect()
+    part.contents.iter().flat_map(|of_image| to_channels_of(of_image).into_iter().take(per_image)).collect()
 }
 
 fn to_channels_of(Content { colors, extremes }: &Content) -> Vec<Vec<f32>> {

@@ -15,8 +15,8 @@ pub(super) const MAX_IMAGES: usize = 256;
 /// Whether each of a volume's channels has an image of its own, and these are added up. Of surfaces the nearest is shown, which is also that of the nearest
 /// part that has one, so that their parts are of one image.
 pub(crate) fn adds_up(volume: &Volume, scene: &Scene) -> bool {
-    let joining = Joining::of(scene.splatting.compositing, scene.classification(volume));
-    joining == Some(Joining::Sum) && !volume.further().is_empty()
+    let (count, compositing) = (volume.channel_count(), scene.splatting.compositing);
+    Joining::of_channels(count, compositing, scene.classification(volume)) == Some(Joining::Sum)
 }
 
 /// Checks that a renderer, which draws all channels at once, can draw parts of a scene.
@@ -43,7 +43,7 @@ pub(crate) fn check_sheets(volume: &Volume, scene: &Scene) -> Result<(), Setting
 /// If the scene's method is not image-aligned, an economy is in use, its compositing has no parts, or the window does not lie in the image.
 pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(), SettingError> {
     let splatting = &scene.splatting;
-    let channels = volume.channels().count();
+    let channels = volume.channel_count();
     if adds_up(volume, scene) && channels > MAX_IMAGES {
         let found = format!("{channels} channels whose images are added up for a part of an image");
         return Err(SettingError::new("volume", found, format!("at most {MAX_IMAGES}")));

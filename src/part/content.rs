@@ -22,7 +22,7 @@ pub struct Content {
 pub struct Extreme {
     /// The value's place in the range of the field's coefficients, from 0 to 1; for `average` the mean value itself.
     pub value: f32,
-    /// [`Self::POINT`] for a point on a plane, and for `average` 1 more for each further one; [`Self::MIDDLE`] for the middle of the visible stretch, which
+    /// [`Self::POINT`] for a point on a plane, and for `average` 1 more for each other one; [`Self::MIDDLE`] for the middle of the visible stretch, which
     /// counts where no plane has a point, and 0 if nothing counted.
     pub counted: f32,
     /// For `average` of a segmented volume with tables of labels, the label of the voxel in the middle of the stretch of the pixel's ray that counts,
@@ -50,70 +50,58 @@ impl Content {
     }
 }
 
-/// The rule by which consecutive slab ranges merge.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Rule {
-    pub(super) compositing: Compositing,
-    pub(super) classification: Classification,
-}
-
-impl Rule {
-    /// Whether pixels carry extremes.
-    pub(super) fn has_extremes(self) -> bool {
-        let is_choice = matches!(self.compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average);
-        is_choice && self.classification == Classification::After
-    }
-
+impl Content {
     /// Merges the slabs behind some slabs into them.
-    pub(super) fn merge(self, front: &mut Content, back: &Content) {
-        if self.has_extremes() {
-            let chosen = front.extremes.iter_mut().zip(&back.extremes);
-            for ((front, back), (chosen, other)) in front.colors.iter_mut().zip(&back.colors).zip(chosen) {
-                let [points, further] = [*chosen, *other].map(|of| of.counted - Extreme::MIDDLE);
-                if self.compositing == Compositing::Average && points > 0.0 && further > 0.0 {
-                    let share = f64::from(further) / f64::from(points + further);
+    pub(super) fn merge(&mut self, back: &Self, (compositing, classification): (Compositing, Classification)) {
+        let colors = self.colors.iter_mut().zip(&back.colors);
+        if compositing.chooses_values(classification) {
+            for ((front, back), (chosen, other)) in colors.zip(self.extremes.iter_mut().zip(&back.extremes)) {
+                let [points, behind] = [*chosen, *other].map(|of| of.counted - Extreme::MIDDLE);
+                if compositing.is_average() && points > 0.0 && behind > 0.0 {
+                    let share = f64::from(behind) / f64::from(points + behind);
                     let mean = |a: f32, b: f32| (f64::from(a) + (f64::from(b) - f64::from(a)) * share) as f32;
                     *front = std::array::from_fn(|channel| mean(front[channel], back[channel]));
                     let value = mean(chosen.value, other.value);
-                    *chosen = Extreme { value, counted: chosen.counted + further, ..*chosen };
-                } else if self.is_better(*other, *chosen) {
+                    *chosen = Extreme { value, counted: chosen.counted + behind, ..*chosen };
+                } else if is_better(compositing, *other, *chosen) {
                     (*front, *chosen) = (*back, *other);
                 }
             }
             return;
         }
-        front.colors.iter_mut().zip(&back.colors).for_each(|(front, back)| *front = self.pixel(*front, *back));
+        colors.for_each(|(front, back)| *front = pixel(compositing, *front, *back));
     }
+}
 
-    /// Whether a value replaces a nearer one.
-    fn is_better(self, other: Extreme, chosen: Extreme) -> bool {
-        if other.counted != chosen.counted {
-            return other.counted > chosen.counted;
-        }
-        match self.compositing {
-            Compositing::Minimum => other.value < chosen.value - HAIR_OF_RANGE,
-            _ => other.value > chosen.value + HAIR_OF_RANGE,
-        }
+/// Whether a value replaces a nearer one.
+fn is_better(compositing: Compositing, other: Extreme, chosen: Extreme) -> bool {
+    if other.counted != chosen.counted {
+        return other.counted > chosen.counted;
     }
+    match compositing.keeps_least() {
+        true => other.value < chosen.value - HAIR_OF_RANGE,
+        false => other.value > chosen.value + HAIR_OF_RANGE,
+    }
+}
 
-    fn pixel(self, front: [f32; 4], back: [f32; 4]) -> [f32; 4] {
-        match self.compositing {
-            Compositing::Linear | Compositing::Exponential => {
-                // Opacity beyond 1 is a rounding error and must not hide another part.
-                let rest = (1.0 - front[3]).max(0.0);
-                std::array::from_fn(|channel| front[channel] + rest * back[channel])
-            }
-            Compositing::Xray | Compositing::Average => std::array::from_fn(|channel| front[channel] + back[channel]),
-            // The nearest of equal ones.
-            Compositing::Maximum | Compositing::Minimum => {
-                if back[3] > front[3] {
-                    back
-                } else {
-                    front
-                }
-            }
-            Compositing::Surface if front[3] >= 1.0 => front,
-            Compositing::Surface => back,
+/// A pixel of two consecutive slab ranges.
+fn pixel(compositing: Compositing, front: [f32; 4], back: [f32; 4]) -> [f32; 4] {
+    match compositing {
+        Compositing::Linear | Compositing::Exponential => {
+            // Opacity beyond 1 is a rounding error and must not hide another part.
+            let rest = (1.0 - front[3]).max(0.0);
+            std::array::from_fn(|channel| front[channel] + rest * back[channel])
         }
+        Compositing::Xray | Compositing::Average => std::array::from_fn(|channel| front[channel] + back[channel]),
+        // The nearest of equal ones.
+        Compositing::Maximum | Compositing::Minimum => {
+            if back[3] > front[3] {
+                back
+            } else {
+                front
+            }
+        }
+        Compositing::Surface if front[3] >= 1.0 => front,
+        Compositing::Surface => back,
     }
 }

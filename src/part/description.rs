@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::channels::{hash_of, to_channels};
 use super::check::MAX_IMAGES;
-use super::mean::{MeanTables, shows_means};
+use super::mean::MeanTables;
 use super::{Identity, Part};
 use crate::image::ImageError;
 use crate::image::channels::Joining;
@@ -199,7 +199,7 @@ pub(super) fn from_json(path: &Path, text: &str) -> Result<(Identity, Window, St
     if !(1..=most).contains(&images) {
         return Err(invalid("part.images", images.to_string(), &format!("1 to {most}")));
     }
-    let expected = if shows_means(compositing, classification) { images } else { 0 };
+    let expected = if compositing.shows_means(classification) { images } else { 0 };
     if means.len() != expected {
         let allowed =
             format!("{expected}: one for each image where compositing is \"average\" and classification \"after\"");

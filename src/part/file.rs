@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use super::channels::{Decoded, from_channels};
-use super::{Part, exr, npz};
+use super::{Content, Part, exr, npz};
 use crate::image::open::{content, of_volume, read};
 use crate::image::{ImageError, output};
-use crate::volume::{Access, ReadOptions};
+use crate::volume::{Access, Channels, ReadOptions};
 
 /// The formats by extension, ignoring case.
 enum Format {
@@ -70,8 +70,9 @@ impl Part {
 
     fn of_channels(name: String, (identity, window, channels): Decoded) -> Self {
         let per_image = channels.len() / identity.images;
-        let contents = channels.chunks(per_image).map(from_channels).collect();
-        Self { name, ..Self::named(identity, window, contents) }
+        // A description has at least one image.
+        let contents = Channels::of(channels.chunks(per_image).map(from_channels));
+        Self { name, ..Self::named(identity, window, contents.unwrap_or_else(|| Content::default().into())) }
     }
 
     /// Saves the part by the file's extension: `.exr`, whose data window is the region and whose display window is the whole image, with the
@@ -92,14 +93,14 @@ impl Part {
         let format = Format::of(path)?;
         let pixels = self.window.region.pixels();
         let extremes = if self.identity.has_extremes() { pixels } else { 0 };
-        for of_image in self.contents() {
+        for of_image in &self.contents {
             if (of_image.colors.len(), of_image.extremes.len()) != (pixels, extremes) {
                 let found = format!("{} and {}", of_image.colors.len(), of_image.extremes.len());
                 return Err(content(path, "pixels", found, format!("{pixels} and {extremes} extremes")));
             }
         }
-        if self.contents().count() != self.identity.images {
-            let (found, allowed) = (self.contents().count().to_string(), self.identity.images.to_string());
+        if self.contents.len() != self.identity.images {
+            let (found, allowed) = (self.contents.len().to_string(), self.identity.images.to_string());
             return Err(content(path, "images of channels", found, allowed));
         }
         match format {

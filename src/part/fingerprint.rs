@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::light::StreamedLight;
-use crate::scene::{Fitting, OpenVolume, Scene, SceneError, VolumeSource};
+use crate::scene::{Channel, Fitting, OpenVolume, Scene, SceneError, VolumeSource};
 use crate::settings::clip::Clip;
 use crate::settings::splatting::Rasterizer;
 use crate::volume::{StreamedVolume, Thinned, Volume};
@@ -31,10 +31,10 @@ pub fn fingerprint(volume: &OpenVolume, scene: &Scene) -> Result<String, SceneEr
 /// # Errors
 /// As for [`fingerprint`].
 pub(crate) fn of_matter(volume: &OpenVolume, explicit: &Scene) -> Result<String, SceneError> {
-    let (transfer, further, visible) = (explicit.transfer.clone(), explicit.further.clone(), explicit.visible);
     // How faces are shaded changes no light.
     let clip = Clip { shade_faces: Clip::default().shade_faces, ..explicit.clip.clone() };
-    let matter = Scene { transfer, further, visible, clip, fitting: Fitting::NONE, ..Scene::new(VolumeSource::Memory) };
+    let channels = explicit.channels.clone();
+    let matter = Scene { channels, clip, fitting: Fitting::NONE, ..Scene::new(VolumeSource::Memory) };
     of_settings(DOMAIN_OF_MATTER, (volume, true), matter)
 }
 
@@ -67,7 +67,7 @@ fn of_settings(domain: &str, (volume, is_lit): (&OpenVolume, bool), explicit: Sc
 
 /// Hashes what identifies the stores of channels and labels: digits, each but the first behind a word that says what it is of.
 fn add_identities(hash: &mut blake3::Hasher, volume: &StreamedVolume) {
-    for (number, channel) in volume.channels().enumerate() {
+    for (number, channel) in volume.channels.iter().enumerate() {
         if number > 0 {
             hash.update(b"\nchannel ");
         }
@@ -103,14 +103,11 @@ fn bits(value: f32) -> u32 {
 
 /// The settings as text, without those that name the volume or what draws it.
 fn settings(mut scene: Scene) -> Result<String, SceneError> {
-    scene.volume = VolumeSource::Memory;
-    (scene.spacing, scene.labels, scene.name) = (None, None, None);
-    (scene.index, scene.time, scene.level, scene.series) = (None, None, None, None);
-    for channel in &mut scene.further {
-        (channel.volume, channel.name) = (VolumeSource::Memory, None);
-        (channel.spacing, channel.labels) = (None, None);
-        (channel.index, channel.time, channel.level, channel.series) = (None, None, None, None);
-    }
+    scene.channels = scene.channels.map(|Channel { visible, transfer, .. }| Channel {
+        visible,
+        transfer,
+        ..Channel::new(VolumeSource::Memory)
+    });
     scene.splatting.rasterizer = Rasterizer::Auto;
     // Tiles never change an image.
     scene.splatting.tiles = true;

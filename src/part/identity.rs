@@ -5,7 +5,7 @@ use std::ops::Range;
 use glam::UVec3;
 
 use super::check::adds_up;
-use super::content::{Content, Rule};
+use super::content::Content;
 use super::fingerprint;
 use super::mean::{MeanTables, note_labels};
 use crate::error::RenderError;
@@ -14,6 +14,7 @@ use crate::geometry::view_geometry::ViewGeometry;
 use crate::scene::{OpenVolume, Scene, SceneError};
 use crate::settings::splatting::{Classification, Compositing, Order, Splatting};
 use crate::settings::window::Window;
+use crate::volume::Channels;
 
 /// A part of an image: f32 pixels without the background, and what identifies them.
 #[derive(Clone, Debug, PartialEq)]
@@ -24,10 +25,8 @@ pub struct Part {
     pub identity: Identity,
     /// The slabs and pixels that it shows.
     pub window: Window,
-    /// Its pixels.
-    pub content: Content,
-    /// Where channels share no sheets (SPEC §10) and their images are added up, the pixels of the channels after the first; otherwise empty.
-    pub further: Vec<Content>,
+    /// Its pixels: of every channel where channels share no sheets (SPEC §10) and their images are added up, otherwise of the only image.
+    pub contents: Channels<Content>,
 }
 
 /// What the parts of one image have in common.
@@ -73,7 +72,7 @@ impl Part {
             let labels_at = |voxels: &[UVec3]| Ok::<_, RenderError>(voxels.iter().map(label).collect());
             note_labels((view, scene, grid), &window.region, &mut content, labels_at)?;
         }
-        Ok(Self::named(identity, window.clone(), vec![content]))
+        Ok(Self::named(identity, window.clone(), content))
     }
 
     /// Whether this is the part of a scene's image in a window, whatever drew it.
@@ -85,17 +84,10 @@ impl Part {
     }
 
     /// A part with its slabs and pixels as its name.
-    pub(crate) fn named(identity: Identity, window: Window, contents: Vec<Content>) -> Self {
+    pub(crate) fn named(identity: Identity, window: Window, contents: impl Into<Channels<Content>>) -> Self {
         let Window { slabs: Range { start, end }, region } = &window;
         let name = format!("slabs {start}..{end} of region {region}");
-        let mut contents = contents.into_iter();
-        let (content, further) = (contents.next().unwrap_or_default(), contents.collect());
-        Self { name, identity, window, content, further }
-    }
-
-    /// The pixels of all images that are added up.
-    pub(crate) fn contents(&self) -> impl Iterator<Item = &Content> {
-        std::iter::once(&self.content).chain(&self.further)
+        Self { name, identity, window, contents: contents.into() }
     }
 }
 
@@ -113,14 +105,14 @@ impl Identity {
             opacity_threshold: scene.splatting.opacity_threshold,
             culling: scene.splatting.culling,
             background: scene.image.background,
-            images: if adds_up(volume.sample(), scene) { volume.sample().channels().count() } else { 1 },
+            images: if adds_up(volume.sample(), scene) { volume.sample().channel_count() } else { 1 },
             means: MeanTables::of(volume.sample(), scene),
         })
     }
 
     /// Whether pixels carry extremes.
     pub(crate) fn has_extremes(&self) -> bool {
-        self.rule().has_extremes()
+        self.compositing.chooses_values(self.classification)
     }
 
     /// Whether pixels note labels, whose tables classify means.
@@ -132,9 +124,5 @@ impl Identity {
     pub(super) fn splatting(&self) -> Splatting {
         let Self { compositing, opacity_threshold, culling, .. } = *self;
         Splatting { compositing, opacity_threshold, culling, ..Splatting::default() }
-    }
-
-    pub(super) fn rule(&self) -> Rule {
-        Rule { compositing: self.compositing, classification: self.classification }
     }
 }

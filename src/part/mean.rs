@@ -9,7 +9,6 @@ use super::content::{Content, Extreme};
 use crate::geometry::pixel_ray::{PixelRay, counted};
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::scene::Scene;
-use crate::settings::splatting::{Classification, Compositing};
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::Region;
 use crate::volume::{Grid, Volume};
@@ -26,19 +25,19 @@ pub struct MeanTables {
 impl MeanTables {
     /// Those of a scene of a volume, for every channel; none unless it shows means.
     pub(super) fn of(volume: &Volume, scene: &Scene) -> Vec<Self> {
-        if !shows_means(scene.splatting.compositing, scene.classification(volume)) {
+        if !scene.splatting.compositing.shows_means(scene.classification(volume)) {
             return Vec::new();
         }
         let transfer = scene.resolve(volume);
         let of_channel = |(channel, transfer): (&Volume, &TransferFunction)| {
-            let mut transfer = TransferFunction { gradient_opacity: None, further: Vec::new(), ..transfer.clone() };
+            let mut transfer = TransferFunction { gradient_opacity: None, ..transfer.clone() };
             transfer.labels.values_mut().for_each(|tables| tables.gradient_opacity = None);
             if channel.labels().is_none() {
                 transfer.labels = BTreeMap::new();
             }
             Self { transfer, has_colors: channel.colors().is_some() }
         };
-        volume.channels().zip(transfer.channels()).map(of_channel).collect()
+        volume.channels().zip(&transfer).map(of_channel).collect()
     }
 
     /// Whether labels have tables of their own.
@@ -61,11 +60,6 @@ impl MeanTables {
         }
         tables.color.at(value).extend(1.0).to_array().map(|channel| (channel * alpha) as f32)
     }
-}
-
-/// Whether pixels show the mean of the values along their rays.
-pub(super) fn shows_means(compositing: Compositing, classification: Classification) -> bool {
-    (compositing, classification) == (Compositing::Average, Classification::After)
 }
 
 /// Notes the labels of a region's pixels whose means are of points on planes, given a view of a scene on the volume's whole grid. `labels_at` finds those of

@@ -10,6 +10,7 @@ use crate::image::Image;
 use crate::image::channels::Joining;
 use crate::scene::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
 use crate::settings::window::{Region, Window};
+use crate::volume::Channels;
 
 /// Why parts do not merge into an image.
 #[derive(Debug, thiserror::Error)]
@@ -123,7 +124,7 @@ impl Image {
 }
 
 /// The pixels of an image of merged slabs.
-fn resolved(contents: Vec<Content>, identity: &Identity) -> Vec<[f32; 4]> {
+fn resolved(contents: Channels<Content>, identity: &Identity) -> Vec<[f32; 4]> {
     let Identity { classification, background, means, .. } = identity;
     let are_joined = contents.len() > 1;
     let behind = if are_joined { [0.0; 4] } else { *background };
@@ -183,10 +184,10 @@ fn check_content(part: &Part) -> Result<(), MergeError> {
     }
     let pixels = window.region.pixels();
     let extremes = if identity.has_extremes() { pixels } else { 0 };
-    let images = ("images of channels", part.contents().count(), identity.images);
+    let images = ("images of channels", part.contents.len(), identity.images);
     let of_image =
         |content: &Content| [("pixels", content.colors.len(), pixels), ("extremes", content.extremes.len(), extremes)];
-    for (field, found, allowed) in std::iter::once(images).chain(part.contents().flat_map(of_image)) {
+    for (field, found, allowed) in std::iter::once(images).chain(part.contents.iter().flat_map(of_image)) {
         if found != allowed {
             return Err(wrong(field, found.to_string(), allowed.to_string()));
         }
@@ -254,7 +255,7 @@ fn sharing((region, parts): Shown<'_>, (other, others): Shown<'_>) -> MergeError
 }
 
 /// The content of a region for every image that is added up, whose parts must show each of the scene's slabs once.
-fn merge_slabs(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Vec<Content>, MergeError> {
+fn merge_slabs(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Channels<Content>, MergeError> {
     let scene = &identity.slabs;
     let Some((slabs, contents)) = merge_neighbours(parts, identity, region)? else {
         if !scene.is_empty() {
@@ -262,7 +263,7 @@ fn merge_slabs(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<
         }
         // A scene without slabs shows nothing.
         let empty = Content::empty(region.pixels(), identity.has_extremes());
-        return Ok(vec![empty; identity.images]);
+        return Ok(Channels::new(empty.clone(), vec![empty; identity.images.saturating_sub(1)]));
     };
     if slabs.start > scene.start {
         return Err(missing(scene.start..slabs.start, region));
@@ -278,7 +279,7 @@ fn missing(Range { start, end }: Range<i32>, region: Region) -> MergeError {
 }
 
 /// Slabs, and their content for every image that is added up.
-type Merged = (Range<i32>, Vec<Content>);
+type Merged = (Range<i32>, Channels<Content>);
 
 /// The scene's slabs that parts of a region show without a gap, and their content; nothing if they show none.
 ///
@@ -286,7 +287,7 @@ type Merged = (Range<i32>, Vec<Content>);
 fn merge_neighbours(parts: Vec<Part>, identity: &Identity, region: Region) -> Result<Option<Merged>, MergeError> {
     let within = |part: Part| {
         let slabs = Window::within(&part.window, &identity.slabs);
-        (slabs, part.name, std::iter::once(part.content).chain(part.further).collect())
+        (slabs, part.name, part.contents)
     };
     let mut shown: Vec<_> = parts.into_iter().map(within).filter(|(slabs, ..)| !slabs.is_empty()).collect();
     shown.sort_by_key(|(slabs, ..)| (slabs.start, slabs.end));
@@ -300,13 +301,14 @@ fn merge_neighbours(parts: Vec<Part>, identity: &Identity, region: Region) -> Re
             return Err(missing(before.end..slabs.start, region));
         }
     }
+    let rule = (identity.compositing, identity.classification);
     let mut merged: Vec<Merged> = shown.into_iter().map(|(slabs, _, contents)| (slabs, contents)).collect();
     while merged.len() > 1 {
         let mut rest = merged.into_iter();
         merged = std::iter::from_fn(|| {
             let (mut slabs, mut front) = rest.next()?;
             if let Some((behind, back)) = rest.next() {
-                front.iter_mut().zip(&back).for_each(|(front, back)| identity.rule().merge(front, back));
+                front.iter_mut().zip(&back).for_each(|(front, back)| front.merge(back, rule));
                 slabs.end = behind.end;
             }
             Some((slabs, front))

@@ -16,12 +16,7 @@ pub(crate) struct Resolver {
 impl Resolver {
     /// The background has straight alpha.
     pub(crate) fn new(splatting: &Splatting, classification: Classification, background: [f64; 4]) -> Self {
-        // After splatting, sums are clamped; everything else is premultiplied RGBA already.
-        let compositing = match (classification, splatting.compositing) {
-            (Classification::After, Compositing::Xray) => Compositing::Xray,
-            (Classification::After, _) => Compositing::Linear,
-            (_, compositing) => compositing,
-        };
+        let compositing = splatting.compositing.finished_as(classification);
         let closing = Closing::of(splatting);
         Self { compositing, closing, background: premultiplied(background) }
     }

@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
+use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::kernel::Kernel;
 use crate::lists::brick::{self, Brick};
@@ -69,10 +70,9 @@ struct Area {
 impl Work {
     fn new(volume: &OpenVolume, scene: &Scene) -> Result<Self, RenderError> {
         let (grid, volume) = (volume.grid(), volume.sample());
-        let transfer = scene.resolve(volume);
-        let scene = scene.framed(volume, &transfer);
-        let size = [scene.image.width, scene.image.height];
-        let slabs = ViewGeometry::new(grid, &scene.camera, &scene.splatting, size)?.slabs_of(grid);
+        let finished = FinishedScene::new(volume, scene)?;
+        let (scene, seen) = finished.framed(volume, grid)?;
+        let (size, slabs) = (seen.size, seen.slabs_of(grid));
         // A sample's voxels share the place and the slabs of those that they stand for.
         let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, size)?;
         let cell = size[0].max(size[1]).div_ceil(CELLS).max(1);
@@ -81,7 +81,7 @@ impl Work {
         let amounts = vec![0.0; cells[0] * cells[1] * bins];
         let mut work = Self { size, cell, cells, slabs, bins, amounts };
         let clipped = scene.clip.voxels(volume.grid(), scene.splatting.radius);
-        let bricks = brick_list(volume, &transfer, &clipped);
+        let bricks = brick_list(volume, &finished.transfer, &clipped);
         let support = Kernel::new(scene.splatting.radius, scene.splatting.falloff).support();
         bricks.bricks().iter().for_each(|brick| work.add(brick, &view, support));
         Ok(work)

@@ -60,15 +60,15 @@ impl Sample {
     }
 
     fn pipeline(&self, mode: SampleMode) -> &OnceLock<RenderPipeline> {
-        &self.pipelines[mode.form as usize][usize::from(mode.compositing == Compositing::Xray)]
+        &self.pipelines[mode.form as usize][usize::from(mode.compositing.is_by_opacity())]
     }
 
     /// Compiles the pipeline for a mode, and binds buffers.
     pub fn bind(&self, device: &Device, mode: SampleMode, buffers: SampleBuffers<'_>) -> BindGroup {
         self.pipeline(mode).get_or_init(|| {
-            let over = added_to(match mode.compositing {
-                Compositing::Xray => wgpu::BlendFactor::One,
-                _ => wgpu::BlendFactor::OneMinusSrcAlpha,
+            let over = added_to(match mode.compositing.is_by_opacity() {
+                true => wgpu::BlendFactor::OneMinusSrcAlpha,
+                false => wgpu::BlendFactor::One,
             });
             let constants = [
                 ("SECTIONS", f64::from(u8::from(mode.form == FootprintForm::Sections))),

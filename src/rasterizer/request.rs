@@ -120,7 +120,6 @@ impl FrameRequest {
         rasterizer: Rasterizer,
     ) -> Result<Self, RenderError> {
         let splatting = scene.splatting;
-        splatting.check()?;
         let (grid, size) = (volume.grid(), [scene.image.width, scene.image.height]);
         let seen = ViewGeometry::new(grid, camera, &splatting, size)?;
         let stored = volume.stored(layer);
@@ -132,8 +131,7 @@ impl FrameRequest {
         let rays = RayMode { cut: is_cut, first_hit: first_hit.is_some() };
         let drawn = window.map_or_else(|| Window::whole(size), |window| window.opened(&seen.slabs_of(grid)));
         splatting.check_rays(rays.cut, first_hit)?;
-        // The nearest surface is the one with the nearest first hit, for any opacity.
-        let first_hit = first_hit.or((joining == Some(Joining::Nearest)).then_some(1.0));
+        let first_hit = joining.map_or(first_hit, |joining| joining.first_hit(first_hit));
         let rays = RayMode { first_hit: first_hit.is_some(), ..rays };
         check_hits(device, rays, size)?;
         let surfaces = hiding.map(|hiding| hiding.depths(&seen, grid)).transpose()?;
@@ -141,8 +139,7 @@ impl FrameRequest {
         let after = is_after.then(|| After::new((volume, layer), scene, &seen)).transpose()?;
         let integration = after.as_ref().map(|after| Integration { splatting: &splatting, numbers: &after.numbers });
         let first_channel = layer.channels.start;
-        let alone = (first_channel > 0).then(|| volume.transfer().of_channel(first_channel));
-        let transfer = alone.as_ref().unwrap_or_else(|| volume.transfer());
+        let transfer = &volume.transfer()[first_channel..];
         let ramps = Ramps::of_channels(transfer, &stored, first_channel as u32, integration);
         Ok(Self {
             layer: layer.clone(),

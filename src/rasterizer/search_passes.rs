@@ -1,14 +1,13 @@
 //! The passes through loops that a transfer function costs the tile rasterizer, which counts them ([`patch_bins`](crate::lists::patch_bins)).
 
 use crate::rasterizer::request::{After, FrameRequest};
-use crate::settings::splatting::Compositing;
 
 /// Before splatting those to look up a voxel's control points, where all ramps are searched in memory if any is, because threads hold at most one point each; after
 /// splatting those to search tables in a slab, those of its halves, and those to find a surface.
 pub(super) fn of(request: &FrameRequest, by_label: bool) -> u32 {
     let lengths = request.ramps.lengths();
     if let Some(after) = &request.after {
-        let is_surface = request.splatting.compositing == Compositing::Surface;
+        let is_surface = request.splatting.compositing.has_surface();
         return slab_passes(request) + if is_surface { surface_passes(request, after, by_label) } else { 0 };
     }
     let channels = request.ramps.channels;

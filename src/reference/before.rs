@@ -35,13 +35,10 @@ struct Frame {
 impl Frame {
     fn new(
         volume: &Volume,
-        transfer: &TransferFunction,
+        transfer: &[TransferFunction],
         (scene, lights): (&Scene, Option<&Arc<Lights>>),
     ) -> Result<Self, RenderError> {
-        // The settings are checked before the camera is framed, which needs valid ones.
-        scene.check()?;
-        transfer.check()?;
-        let scene = &scene.framed(volume, transfer);
+        let scene = &super::framed(volume, transfer, scene)?;
         let geometry = Geometry::new(volume.grid(), scene)?;
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let voxels = shading::taking_part(volume, transfer, &geometry);
@@ -62,7 +59,7 @@ impl Frame {
 }
 
 /// See [`super::count`].
-pub(super) fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+pub(super) fn count(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Counts, RenderError> {
     // Counts do not depend on light.
     let frame = Frame::new(volume, transfer, (scene, Some(&Arc::default())))?;
     let buckets = frame.buckets();
@@ -93,7 +90,7 @@ pub(super) fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene)
 pub(super) fn render_for(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     test: Option<Test>,
 ) -> Result<Culled, RenderError> {
@@ -110,7 +107,7 @@ pub(super) fn render_for(
 /// See [`super::part`].
 pub(super) fn part(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     Window { slabs, region }: &Window,
 ) -> Result<Content, RenderError> {
@@ -161,13 +158,13 @@ impl<'a> Picture<'a> {
     fn new(frame: &'a Frame, scene: &Scene, (host, slabs): (Host<'_>, Range<i32>), test: Option<Test>) -> Self {
         let (compositing, order) = (scene.splatting.compositing, scene.splatting.order);
         // While no surface has been reached, alpha is below one half; a surface itself is opaque.
-        let threshold = if compositing == Compositing::Surface { 1.0 } else { scene.splatting.opacity_threshold };
+        let threshold = if compositing.has_surface() { 1.0 } else { scene.splatting.opacity_threshold };
         let test = test.filter(|_| order == Order::FrontToBack && compositing.hides());
         let is_cut = host.surfaces.is_some() || !scene.clip.is_empty();
         let geometry = &frame.geometry;
         let Range { start, end } = slabs;
         // A surface may begin to rise in the slab before.
-        let start = if compositing == Compositing::Surface && start < end { start - 1 } else { start };
+        let start = if compositing.has_surface() && start < end { start - 1 } else { start };
         Self {
             frame,
             slabs: start..end,
@@ -233,7 +230,7 @@ impl<'a> Picture<'a> {
         let mut sheet = Buffer { width: self.acc.width, pixels: vec![DVec4::ZERO; self.acc.pixels.len()] };
         splat::draw(sections, &self.frame.kernel, &mut sheet, |pixel, amount| *pixel += amount);
         // A cut does not lower the mean of a slab's visible part, which is what `Minimum` looks for.
-        if let Some(cuts) = self.cuts.as_ref().filter(|_| self.compositing != Compositing::Minimum) {
+        if let Some(cuts) = self.cuts.as_ref().filter(|_| !self.compositing.keeps_least()) {
             cuts.apply(&mut sheet, k);
         }
         if let Some(means) = &self.means {

@@ -24,7 +24,7 @@ impl FirstHits {
     /// Notes the pixels in which one sheet raised the opacity to the value: the position is interpolated linearly within the sheet's visible
     /// part. For a surface it is the surface's own.
     pub(super) fn note(&mut self, before: &Buffer, sheet: &Buffer, after: &Buffer, number: i32, cuts: Option<&Cuts>) {
-        let is_surface = self.compositing == Compositing::Surface;
+        let is_surface = self.compositing.has_surface();
         let opacity = if is_surface { 1.0 } else { self.opacity };
         for (pixel, hit) in self.sheets.iter_mut().enumerate().filter(|(_, hit)| hit.is_none()) {
             let [before, sheet, after] = [before, sheet, after].map(|buffer| buffer.pixels[pixel]);

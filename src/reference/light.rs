@@ -52,7 +52,7 @@ impl Lights {
     ///
     /// # Errors
     /// If the scene needs more than can be computed.
-    pub fn new(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Self, RenderError> {
+    pub fn new(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Self, RenderError> {
         let shading = &scene.shading;
         if !shading.enabled {
             return Ok(Self::default());
@@ -79,7 +79,7 @@ impl Lights {
     pub(super) fn or_new(
         given: Option<&Arc<Self>>,
         volume: &Volume,
-        transfer: &TransferFunction,
+        transfer: &[TransferFunction],
         scene: &Scene,
     ) -> Result<Arc<Self>, RenderError> {
         given.map_or_else(|| Self::new(volume, transfer, scene).map(Arc::new), |given| Ok(Arc::clone(given)))
@@ -118,7 +118,7 @@ impl LightSheets {
     /// # Errors
     /// If the scene needs more than can be computed.
     pub fn new(
-        (volume, transfer): (&Volume, &TransferFunction),
+        (volume, transfer): (&Volume, &[TransferFunction]),
         scene: &Scene,
         to_light: DVec3,
         spread: f64,
@@ -182,7 +182,7 @@ impl LightSheets {
 
 /// The voxels that take part, whatever `near` is, and whose centres no cut leaves out: their indices, and their splats, which have amounts alone.
 fn lit_voxels(
-    (volume, transfer): (&Volume, &TransferFunction),
+    (volume, transfer): (&Volume, &[TransferFunction]),
     geometry: &Geometry,
     clip: &[HalfSpace],
 ) -> (Vec<u32>, Vec<Splat>) {

@@ -40,7 +40,7 @@ impl Means {
         let (_, centers) = geometry.grid.whole();
         let weight = |at: u32| {
             let ray = ray(at);
-            if compositing != Compositing::Average {
+            if !compositing.is_average() {
                 let sheets_per_depth = ray.sheet(geometry, 1.0) - ray.sheet(geometry, 0.0);
                 return sheets_per_depth.abs() / ray.along.length();
             }
@@ -63,7 +63,7 @@ impl Means {
         };
         Self {
             weights: pixels.clone().into_par_iter().map(weight).collect(),
-            counted: (compositing == Compositing::Minimum).then(|| pixels.into_par_iter().map(counted).collect()),
+            counted: (compositing.keeps_least()).then(|| pixels.into_par_iter().map(counted).collect()),
         }
     }
 

@@ -23,6 +23,7 @@ pub mod sheets;
 pub mod splat;
 pub mod visibility;
 
+use std::slice::from_ref;
 use std::sync::Arc;
 
 use crate::error::RenderError;
@@ -52,7 +53,7 @@ pub use visibility::Areas;
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
-pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
+pub fn render(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Image, RenderError> {
     render_culled(volume, transfer, scene, None).map(|culled| culled.image)
 }
 
@@ -60,13 +61,14 @@ pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Re
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
-pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+pub fn count(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Counts, RenderError> {
     let classification = scene.classification(volume);
-    if Joining::of(scene.splatting.compositing, classification).is_some() && !transfer.further.is_empty() {
+    if joining(volume, transfer, scene).is_some() {
         let scene = scene.framed(volume, transfer);
-        let mut all = count(volume, &transfer.of_channel(0), &scene)?;
-        for (number, volume) in (1..=transfer.further.len()).zip(volume.further()) {
-            all.add_channel(&count(volume, &transfer.of_channel(number), &scene)?);
+        let mut counts = channels(volume, transfer).map(|(volume, of)| count(volume, from_ref(of), &scene));
+        let mut all = counts.next().unwrap_or_else(|| Ok(Counts::default()))?;
+        for of_channel in counts {
+            all.add_channel(&of_channel?);
         }
         return Ok(all);
     }
@@ -83,7 +85,7 @@ pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Res
 /// If the scene needs more than can be computed.
 pub fn render_culled(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
@@ -97,7 +99,7 @@ pub fn render_culled(
 pub fn render_for(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
@@ -108,13 +110,12 @@ pub fn render_for(
 fn render_lit(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     test: Option<visibility::Test>,
 ) -> Result<Culled, RenderError> {
     let classification = scene.classification(volume);
-    let joining = Joining::of(scene.splatting.compositing, classification);
-    if let Some(joining) = joining.filter(|_| channels(volume, transfer).nth(1).is_some()) {
+    if let Some(joining) = joining(volume, transfer, scene) {
         return render_joined(host, volume, transfer, scene, test, joining);
     }
     if classification == Classification::After {
@@ -123,28 +124,36 @@ fn render_lit(
     before::render_for(host, volume, transfer, (scene, lights), test)
 }
 
+/// How the images of the channels that are drawn become one; `None` if they share sheets, or there is one.
+fn joining(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Option<Joining> {
+    let (count, compositing) = (channels(volume, transfer).count(), scene.splatting.compositing);
+    Joining::of_channels(count, compositing, scene.classification(volume))
+}
+
+/// A scene with its camera's frame. The settings are checked first, because framing needs valid ones.
+fn framed(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Scene, SettingError> {
+    scene.check()?;
+    TransferFunction::check_channels(transfer)?;
+    Ok(scene.framed(volume, transfer))
+}
+
 /// Renders every channel by itself, and joins the images (SPEC §10).
 fn render_joined(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     test: Option<visibility::Test>,
     joining: Joining,
 ) -> Result<Culled, RenderError> {
-    scene.check()?;
-    transfer.check()?;
     // All channels share a camera.
-    let mut scene = scene.framed(volume, transfer);
+    let mut scene = framed(volume, transfer, scene)?;
     let lights = Arc::new(Lights::new(volume, transfer, &scene)?);
     let background = std::mem::replace(&mut scene.image.background, [0.0; 4]);
-    let of_channel = match joining {
-        Joining::Sum => host,
-        Joining::Nearest => Host { first_hit: Some(host.first_hit.unwrap_or(1.0)), ..host },
-    };
+    let of_channel = Host { first_hit: joining.first_hit(host.first_hit), ..host };
     let mut all: Option<Culled> = None;
-    for (number, volume) in volume.channels().enumerate().take(1 + transfer.further.len()) {
-        let channel = render_lit(of_channel, volume, &transfer.of_channel(number), (&scene, Some(&lights)), test)?;
+    for (volume, transfer) in channels(volume, transfer) {
+        let channel = render_lit(of_channel, volume, from_ref(transfer), (&scene, Some(&lights)), test)?;
         let Some(all) = &mut all else {
             all = Some(channel);
             continue;
@@ -163,32 +172,18 @@ fn render_joined(
 }
 
 /// The pixels of a part of a scene's image, before the background (SPEC §11). Nothing is culled. The window has no end where it reaches an end
-/// of the scene.
+/// of the scene. `lights` are those of all channels, or of the whole volume of a box, if they are not the volume's own.
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
 pub fn part(
     volume: &Volume,
-    transfer: &TransferFunction,
-    scene: &Scene,
-    window: &Window,
-) -> Result<Content, RenderError> {
-    lit_part(volume, transfer, (scene, None), window)
-}
-
-/// [`part`]; `lights` are those of all channels, or of the whole volume of a box, if they are not the volume's own.
-///
-/// # Errors
-/// As for [`part`].
-pub fn lit_part(
-    volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     window: &Window,
 ) -> Result<Content, RenderError> {
     let classification = scene.classification(volume);
-    let joining = Joining::of(scene.splatting.compositing, classification);
-    if joining == Some(Joining::Nearest) && channels(volume, transfer).nth(1).is_some() {
+    if joining(volume, transfer, scene) == Some(Joining::Nearest) {
         return after::nearest_part(volume, transfer, (scene, lights), window);
     }
     if classification == Classification::After {

@@ -27,8 +27,5 @@ pub(super) fn alpha(volume: &Volume, transfer: &TransferFunction, index: u32) ->
 
 /// `m`: the amount per unit length (SPEC §5).
 pub fn amount(compositing: Compositing, alpha: f64) -> f64 {
-    match compositing {
-        Compositing::Exponential => -(-alpha.min(0.9999)).ln_1p(),
-        _ => alpha,
-    }
+    if compositing.is_optical_depth() { -(-alpha.min(0.9999)).ln_1p() } else { alpha }
 }

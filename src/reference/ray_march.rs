@@ -11,7 +11,6 @@ use glam::{DVec3, DVec4, IVec3, UVec2, UVec3};
 use super::composite::composite_pixel;
 use super::{Buffer, Geometry, Lights, cut, resolve, shading};
 use crate::error::RenderError;
-use crate::image::Image;
 use crate::kernel::Kernel;
 use crate::parallel::prelude::*;
 use crate::scene::Scene;
@@ -25,23 +24,13 @@ pub const STEP: f64 = 0.05;
 /// A ray ends early when its pixel cannot change by more than this.
 const REST: f64 = 1e-7;
 
-/// Marches the rays of all pixels of a scene.
-///
-/// # Errors
-/// If the scene needs more than can be computed.
-pub fn render(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Image, RenderError> {
-    let (width, height) = (scene.image.width, scene.image.height);
-    let all: Vec<UVec2> = (0..height).flat_map(|y| (0..width).map(move |x| UVec2::new(x, y))).collect();
-    Ok(Image { width, height, pixels: pixels(volume, transfer, scene, &all)? })
-}
-
 /// Marches the rays of some pixels of a scene.
 ///
 /// # Errors
 /// If the scene asks for more than can be computed.
 pub fn pixels(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     pixels: &[UVec2],
 ) -> Result<Vec<[f32; 4]>, RenderError> {
@@ -122,7 +111,7 @@ impl Field {
 
     fn new(
         volume: &Volume,
-        transfer: &TransferFunction,
+        transfer: &[TransferFunction],
         scene: &Scene,
         geometry: &Geometry,
     ) -> Result<Self, RenderError> {
@@ -222,7 +211,7 @@ mod tests {
         values[13] = 1.0;
         let volume = Volume::new("voxel", UVec3::splat(3), DVec3::new(1.0, 1.0, 2.0), values).unwrap();
         let mut scene = Scene::new(VolumeSource::Builtin("cube".to_owned()));
-        scene.transfer.opacity = Some(Ramp::new(vec![(0.5, 0.0), (1.0, 0.6)]).unwrap());
+        scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.5, 0.0), (1.0, 0.6)]).unwrap());
         (scene.image.width, scene.image.height, scene.image.background) = (1, 1, [0.0; 4]);
         let transfer = scene.resolve(&volume);
         let kernel = Kernel::new(2.0, 2.0);

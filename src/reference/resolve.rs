@@ -24,8 +24,7 @@ pub fn resolve(acc: &Buffer, (compositing, splatting): (Compositing, &Splatting)
 /// A pixel whose culling may have stopped it (SPEC §6, closing).
 fn closed(acc: DVec4, splatting: &Splatting) -> DVec4 {
     let Splatting { compositing, culling, opacity_threshold: threshold, .. } = *splatting;
-    let is_composited = matches!(compositing, Compositing::Linear | Compositing::Exponential);
-    if !is_composited || !culling || threshold == 1.0 || acc.w <= 0.0 {
+    if !compositing.is_by_opacity() || !culling || threshold == 1.0 || acc.w <= 0.0 {
         return acc;
     }
     let least = (2.0 * threshold - 1.0).max(0.0);

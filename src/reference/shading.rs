@@ -17,7 +17,7 @@ use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 
 /// The indices in memory of the voxels that take part, ascending.
-pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geometry) -> Vec<u32> {
+pub fn taking_part(volume: &Volume, transfer: &[TransferFunction], geometry: &Geometry) -> Vec<u32> {
     let has_alpha =
         |&index: &u32| channels(volume, transfer).any(|(volume, transfer)| alpha(volume, transfer, index) > 0.0);
     let is_shown = |&index: &u32| {
@@ -34,7 +34,7 @@ pub fn taking_part(volume: &Volume, transfer: &TransferFunction, geometry: &Geom
 /// If the scene's light sheets need more than can be computed.
 pub fn shade(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     scene: &Scene,
     geometry: &Geometry,
 ) -> Result<Vec<Splat>, RenderError> {
@@ -46,7 +46,7 @@ pub fn shade(
 pub fn splats(
     voxels: &[u32],
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, &Lights),
     geometry: &Geometry,
 ) -> Vec<Splat> {
@@ -62,7 +62,7 @@ pub fn splats(
 /// `(C·m, m)` of a voxel, the sum of all channels' (SPEC §10): their footprints are the same, so one splat draws them all.
 pub fn emission(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, &Lights),
     geometry: &Geometry,
     index: u32,

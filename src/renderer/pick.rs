@@ -18,7 +18,7 @@ pub struct PendingPick {
     view: ViewGeometry,
     pixel: [u32; 2],
     volume: Arc<Volume>,
-    transfer: TransferFunction,
+    transfer: Vec<TransferFunction>,
     arrival: Option<Receiver<Result<(), BufferAsyncError>>>,
 }
 
@@ -29,7 +29,7 @@ impl PendingPick {
         first_hits: &Texture,
         pixel: [u32; 2],
         view: &ViewGeometry,
-        (volume, transfer): (&Arc<Volume>, &TransferFunction),
+        (volume, transfer): (&Arc<Volume>, &[TransferFunction]),
     ) -> Self {
         let staging = device.create_buffer(&BufferDescriptor {
             label: Some("sheetsplat.pick"),
@@ -47,7 +47,7 @@ impl PendingPick {
             wgpu::TexelCopyBufferInfo { buffer: &staging, layout: wgpu::TexelCopyBufferLayout::default() },
             wgpu::Extent3d { width: 1, height: 1, depth_or_array_layers: 1 },
         );
-        Self { staging, view: *view, pixel, volume: volume.clone(), transfer: transfer.clone(), arrival: None }
+        Self { staging, view: *view, pixel, volume: volume.clone(), transfer: transfer.to_vec(), arrival: None }
     }
 
     /// The picked point, once the encoder was submitted, its work is done, and the device was polled. The first call after submitting requests
@@ -80,7 +80,7 @@ impl PendingPick {
         news.map_err(|error| failed(error.to_string()))?;
         let bytes = self.staging.get_mapped_range(..).map_err(|error| failed(error.to_string()))?;
         let depth: f32 = bytemuck::pod_read_unaligned(&bytes[..4]);
-        let of = (&*self.volume, &self.transfer);
+        let of = (&*self.volume, &*self.transfer);
         Ok(depth.is_finite().then(|| Pick::at(&self.view, of, self.pixel, depth.into())))
     }
 }

@@ -6,6 +6,7 @@ use wgpu::{CommandEncoder, Device, Texture};
 
 use crate::error::setting::{Interval, SettingError};
 use crate::error::{RenderError, check_device};
+use crate::finished::FinishedScene;
 use crate::geometry::surfaces::Surfaces;
 use crate::gpu::classified_volume::{ClassifiedVolume, Touched};
 use crate::gpu::counts::PendingCounts;
@@ -25,6 +26,7 @@ use crate::settings::shading::{Light, Shading};
 use crate::settings::splatting::{Splatting, check_first_hit};
 use crate::settings::transfer_function::{TransferFunction, check_iso_ranges};
 use crate::settings::window::Window;
+use crate::volume::Channels;
 
 /// A view of a volume: camera, image, transfer function, shading and splatting settings, and the last frame's buffers. Setters take effect
 /// with the next [`Renderer::prepare`](crate::renderer::Renderer::prepare). A setter that refuses a value names the field, as reading a
@@ -54,10 +56,7 @@ impl SceneView {
     /// another device; or if the device fails.
     pub fn new(device: &Device, volume: &GpuVolume, scene: &Scene) -> Result<Self, RenderError> {
         check_device(device, volume.device(), "the volume")?;
-        scene.check()?;
-        scene.check_volume(volume.volume())?;
-        let scene = scene.settled(volume.volume());
-        let transfer = scene.resolve(volume.volume());
+        let FinishedScene { scene, transfer } = FinishedScene::new(volume.volume(), scene)?;
         let clipped = scene.clip.voxels(volume.volume().grid(), scene.splatting.radius);
         let splatting = &scene.splatting;
         let volume = scoped(device, || ClassifiedVolume::new(device, volume, transfer, clipped, splatting))?;
@@ -108,8 +107,12 @@ impl SceneView {
     ///
     /// # Errors
     /// If a setting is invalid; then nothing changes.
-    pub fn set_transfer_function(&mut self, transfer: TransferFunction) -> Result<Touched, SettingError> {
-        transfer.check()?;
+    pub fn set_transfer_function(
+        &mut self,
+        transfer: impl Into<Channels<TransferFunction>>,
+    ) -> Result<Touched, SettingError> {
+        let transfer = transfer.into();
+        TransferFunction::check_channels(&transfer)?;
         Ok(self.volume.set_transfer_function(transfer))
     }
 
@@ -197,8 +200,8 @@ impl SceneView {
     }
 
     /// Requests the depth at which every pixel's opacity reaches a value above 0 and at most 1, or nothing with `None`. Front to back only, and
-    /// with culling at most [`Splatting::opacity_threshold`]. Not for [`Compositing::Minimum`](crate::settings::splatting::Compositing::Minimum);
-    /// for [`Compositing::Surface`](crate::settings::splatting::Compositing::Surface) it is the surface's depth for any value. See
+    /// with culling at most [`Splatting::opacity_threshold`]. Not for `minimum`;
+    /// for `surface` it is the surface's depth for any value. See
     /// [`Self::first_hits`] and [`Self::pick`].
     ///
     /// # Errors
@@ -223,7 +226,7 @@ impl SceneView {
         let hits = frame.first_hits.as_ref()?;
         let is_inside = pixel[0] < frame.view.size[0] && pixel[1] < frame.view.size[1];
         is_inside.then(|| {
-            let of = (self.volume.volume(), self.volume.transfer());
+            let of = (self.volume.volume(), &**self.volume.transfer());
             PendingPick::record(device, encoder, &hits.texture, pixel, &frame.view, of)
         })
     }

@@ -22,7 +22,7 @@ pub struct Channel {
     pub spacing: Option<DVec3>,
     /// A file with one label per voxel, in place of the volume's own labels.
     pub labels: Option<PathBuf>,
-    /// The number, from 0, of the channel that is read of a file with several.
+    /// The number, from 0, of the only channel that is read of a file with several; `None` reads all of a scene's only file.
     pub index: Option<u32>,
     /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
     pub time: Option<u32>,

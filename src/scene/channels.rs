@@ -9,56 +9,37 @@ use super::{Channel, Scene, TransferSettings, VolumeSource};
 use crate::appearance::{Preset, categories, channel_color, channel_display, labels_of_several, one_of_several};
 use crate::settings::transfer_function::{Ramp, TransferFunction};
 use crate::settings::{Classification, Gradient};
-use crate::volume::Volume;
+use crate::volume::{Channels, Volume};
 
 impl Scene {
-    /// The channels that the scene has settings for, the first of which are the scene's own.
-    pub fn channels(&self) -> impl Iterator<Item = Cow<'_, Channel>> {
-        let Self { name, visible, volume, spacing, labels, index, time, level, series, transfer, .. } = self;
-        let first = Channel {
-            name: name.clone(),
-            visible: *visible,
-            volume: volume.clone(),
-            spacing: *spacing,
-            labels: labels.clone(),
-            index: *index,
-            time: *time,
-            level: *level,
-            series: series.clone(),
-            transfer: transfer.clone(),
-        };
-        std::iter::once(Cow::Owned(first)).chain(self.further.iter().map(Cow::Borrowed))
-    }
-
     /// The settings of a channel of the scene's volume. A scene with settings for one channel shows all of its volume's by them; in any other, channels
     /// without settings have the default ones.
     pub(super) fn settings_of(&self, number: usize) -> Cow<'_, Channel> {
         let default = || {
-            let transfer = TransferSettings { preset: self.transfer.preset, ..TransferSettings::default() };
+            let transfer =
+                TransferSettings { preset: self.channels.first().transfer.preset, ..TransferSettings::default() };
             Cow::Owned(Channel { transfer, ..Channel::new(VolumeSource::Memory) })
         };
-        let number = if self.further.is_empty() { 0 } else { number };
-        self.channels().nth(number).unwrap_or_else(default)
+        let number = if self.channels.len() == 1 { 0 } else { number };
+        self.channels.get(number).map_or_else(default, Cow::Borrowed)
     }
 
-    /// The complete transfer function for a volume and all of its channels ([`TransferSettings::resolve`]); an invisible channel has no opacity.
+    /// The complete transfer functions for a volume's channels ([`TransferSettings::resolve`]); an invisible channel has no opacity.
     /// Where a volume has several channels, those whose colours are not stated have their files', or else a colour each (magenta and green, then cyan,
     /// magenta and yellow, …); those whose opacities are not, a window of their values each. Label maps among them keep their labels' colours, unless a
     /// preset shows projections. On a light background projections of one channel are dark, as on film.
-    pub fn resolve(&self, volume: &Volume) -> TransferFunction {
+    pub fn resolve(&self, volume: &Volume) -> Channels<TransferFunction> {
         if self.is_fitting() {
             return self.fitted(volume).resolve(volume);
         }
-        let mut channels = (0..).zip(volume.channels()).map(|(number, channel)| {
+        volume.each_channel(|number, channel| {
             if self.settings_of(number).visible {
                 let membership = self.takes_membership(volume) && self.is_label_map(number, channel);
                 TransferFunction { membership, ..self.transfer_of(number, volume, channel) }
             } else {
                 TransferFunction::transparent()
             }
-        });
-        let first = channels.next().unwrap_or_else(TransferFunction::transparent);
-        TransferFunction { further: channels.collect(), ..first }
+        })
     }
 
     /// Whether channels that are label maps take normals of the membership of labels (SPEC §15).
@@ -88,7 +69,7 @@ impl Scene {
     /// The transfer function of a channel, visible or not.
     fn transfer_of(&self, number: usize, volume: &Volume, channel: &Volume) -> TransferFunction {
         let settings = &self.settings_of(number).transfer;
-        let count = volume.channels().count();
+        let count = volume.channel_count();
         let has_color = settings.color.is_some() || settings.colormap.is_some();
         if count == 1 {
             let transfer = settings.resolve(channel);
@@ -104,7 +85,7 @@ impl Scene {
         let chosen = |preset: Option<Preset>| match preset {
             _ if shows_labels => labels_of_several(channel, preset),
             None | Some(Preset::None | Preset::Confocal) => one_of_several(channel),
-            Some(preset) if number > 0 => preset.transfer_of_further(channel),
+            Some(preset) if number > 0 => preset.transfer_of_later(channel),
             Some(preset) => preset.transfer(channel),
         };
         let keeps_color = shows_labels || matches!(settings.preset, Some(Preset::Fusion | Preset::Labels));
@@ -117,11 +98,11 @@ impl Scene {
     }
 
     /// The channels of a volume with everything stated that depends on it.
-    pub(super) fn explicit_channels(&self, volume: &Volume) -> Vec<Channel> {
-        let channel = |(number, channel): (usize, &Volume)| {
+    pub(super) fn explicit_channels(&self, volume: &Volume) -> Channels<Channel> {
+        volume.each_channel(|number, channel| {
             let settings = self.settings_of(number).into_owned();
             // A channel without a table is one of the first one's volume, which only that one's table describes.
-            let settings = match number <= self.further.len() {
+            let settings = match number < self.channels.len() {
                 true => settings,
                 false => Channel { visible: settings.visible, ..Channel::new(VolumeSource::Memory) },
             };
@@ -134,23 +115,19 @@ impl Scene {
                 ..TransferSettings::stating(self.transfer_of(number, volume, channel), channel)
             };
             Channel { name, transfer, ..settings }
-        };
-        (0..).zip(volume.channels()).map(channel).collect()
+        })
     }
 
     /// The scene with only some of its channels, by their numbers in ascending order, for a volume of these. The scene must have settings for each of them.
     pub(crate) fn of_channels(&self, numbers: &[usize]) -> Self {
-        let kept = self.channels().enumerate().filter(|(number, _)| numbers.contains(number));
-        let mut kept = kept.map(|(_, channel)| channel.into_owned());
-        let Some(first) = kept.next() else { return self.clone() };
-        let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } = first;
-        let further = kept.collect();
-        Self { name, visible, volume, spacing, labels, index, time, level, series, transfer, further, ..self.clone() }
+        let kept = self.channels.iter().enumerate().filter(|(number, _)| numbers.contains(number));
+        let Some(channels) = Channels::of(kept.map(|(_, channel)| channel.clone())) else { return self.clone() };
+        Self { channels, ..self.clone() }
     }
 
     /// The name of a channel of a volume: the scene's, the file's, or `channel N`, counted from 0.
     pub fn channel_name(&self, volume: &Volume, number: usize) -> String {
-        let stated = self.channels().nth(number).and_then(|channel| channel.name.clone());
+        let stated = self.channels.get(number).and_then(|channel| channel.name.clone());
         let of_file = || volume.channel(number)?.channel_name().map(str::to_owned);
         stated.or_else(of_file).unwrap_or_else(|| format!("channel {number}"))
     }

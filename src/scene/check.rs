@@ -1,7 +1,5 @@
 //! Checks of scene settings that their types do not enforce.
 
-use std::borrow::Cow;
-
 use super::{Channel, ImageSettings, Scene, TransferSettings};
 use crate::appearance::Colormap;
 use crate::error::setting::{Interval, SettingError};
@@ -85,18 +83,32 @@ impl Scene {
     /// # Errors
     /// If a setting is invalid. What depends on the volume or the device is checked when a frame is prepared.
     pub fn check(&self) -> Result<(), SettingError> {
-        if let Some(spacing) = self.spacing {
+        if let Some(spacing) = self.channels.first().spacing {
             check_spacing("volume.spacing", spacing)?;
         }
-        self.camera.check()?;
-        self.image.check()?;
-        self.clip.check()?;
-        for (number, channel) in self.channels().enumerate() {
+        self.check_tables()?;
+        for (number, channel) in self.channels.iter().enumerate() {
             channel.transfer.check_as(&self.transfer_table(number))?;
         }
         self.check_pieces()?;
+        self.check_membership()
+    }
+
+    /// [`Self::check`], and that a volume has what the scene needs ([`Self::check_volume`]).
+    ///
+    /// # Errors
+    /// As for these.
+    pub fn check_for(&self, volume: &Volume) -> Result<(), SettingError> {
+        self.check()?;
+        self.check_volume(volume)
+    }
+
+    /// Checks the settings of all tables but those of channels.
+    pub(super) fn check_tables(&self) -> Result<(), SettingError> {
+        self.camera.check()?;
+        self.image.check()?;
+        self.clip.check()?;
         self.shading.check()?;
-        self.check_membership()?;
         self.splatting.check()
     }
 
@@ -105,11 +117,11 @@ impl Scene {
         if self.shading.gradient == Gradient::Membership {
             return Some("shading.gradient".to_owned());
         }
-        let of_channel = |(number, channel): (usize, Cow<'_, Channel>)| {
+        let of_channel = |(number, channel): (usize, &Channel)| {
             let at = channel.transfer.labels.values().position(|tables| tables.membership)?;
             Some(format!("{}.label[{at}].gradient", self.transfer_table(number)))
         };
-        self.channels().enumerate().find_map(of_channel)
+        self.channels.iter().enumerate().find_map(of_channel)
     }
 
     /// Checks that values are classified before splatting where voxels have normals of the membership of their labels (SPEC §15).
@@ -125,11 +137,7 @@ impl Scene {
 
     /// Checks that the tables of all channels together are not too long.
     pub(super) fn check_pieces(&self) -> Result<(), SettingError> {
-        let further = self.further.iter().map(|channel| &channel.transfer);
-        check_pieces(
-            &self.transfer_table(0),
-            std::iter::once(&self.transfer).chain(further).map(TransferSettings::parts),
-        )
+        check_pieces(&self.transfer_table(0), self.channels.iter().map(|channel| channel.transfer.parts()))
     }
 
     /// Checks that a volume has the channels that the scene has tables for, and the labels or palettes that these need.
@@ -137,7 +145,7 @@ impl Scene {
     /// # Errors
     /// If it lacks any of them: see [`TransferSettings::check_volume`].
     pub fn check_volume(&self, volume: &Volume) -> Result<(), SettingError> {
-        let (tables, channels) = (1 + self.further.len(), volume.channels().count());
+        let (tables, channels) = (self.channels.len(), volume.channel_count());
         if tables > channels {
             let found = format!("tables for {tables} channels");
             return Err(SettingError::new("channel", found, format!("at most {channels}, as many as the volume has")));
@@ -155,6 +163,6 @@ impl Scene {
 
     /// The key of a channel's transfer function.
     fn transfer_table(&self, number: usize) -> String {
-        if self.further.is_empty() { "transfer".to_owned() } else { format!("channel[{number}].transfer") }
+        if self.channels.len() == 1 { "transfer".to_owned() } else { format!("channel[{number}].transfer") }
     }
 }

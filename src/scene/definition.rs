@@ -1,14 +1,11 @@
 //! A scene's settings.
 
-use std::path::PathBuf;
-
-use glam::DVec3;
-
 use super::{Channel, Fitting, ImageSettings, TransferSettings, VolumeSource};
 use crate::settings::camera::Camera;
 use crate::settings::clip::Clip;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
+use crate::volume::Channels;
 
 /// Everything that determines an image, except the device that computes it.
 ///
@@ -19,34 +16,15 @@ use crate::settings::splatting::{Classification, Splatting};
 /// of these tables if the others name no volume: that of the channel with this number.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// The source of the volume. This, and all up to `transfer`, are those of the first channel.
-    pub volume: VolumeSource,
-    /// World units between neighbouring voxels, each above 0, in place of the volume's own spacing.
-    pub spacing: Option<DVec3>,
-    /// A file with one label per voxel, in place of the volume's own labels.
-    pub labels: Option<PathBuf>,
-    /// The number, from 0, of the only channel that is read of a file with several; `None` reads all.
-    pub index: Option<u32>,
-    /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
-    pub time: Option<u32>,
-    /// The level, from 0 for the finest, that is read of a store with several; `None` chooses one ([`Self::choose_levels`]).
-    pub level: Option<u32>,
-    /// The series that is read of a folder with several: its number, from 0, or its `SeriesInstanceUID`; `None` reads the largest.
-    pub series: Option<String>,
-    /// The name of the channel in legends and picks; `None` uses the file's.
-    pub name: Option<String>,
-    /// Whether the channel is drawn.
-    pub visible: bool,
+    /// The channels (SPEC §10), all on the first one's grid: where the volume comes from, and the transfer functions. A scene with one shows all channels of
+    /// its volume by it.
+    pub channels: Channels<Channel>,
     /// The camera.
     pub camera: Camera,
     /// The image's size and background.
     pub image: ImageSettings,
     /// What is cut away.
     pub clip: Clip,
-    /// Colour and opacity.
-    pub transfer: TransferSettings,
-    /// The channels after the first (SPEC §10), all on its grid.
-    pub further: Vec<Channel>,
     /// Light and material.
     pub shading: Shading,
     /// Kernel, slabs, compositing, culling.
@@ -59,23 +37,25 @@ impl Scene {
     /// A scene of a volume with every setting at its default.
     pub fn new(volume: VolumeSource) -> Self {
         Self {
-            volume,
-            spacing: None,
-            labels: None,
-            index: None,
-            time: None,
-            level: None,
-            series: None,
-            name: None,
-            visible: true,
+            channels: Channel::new(volume).into(),
             camera: Camera::of_object(),
             image: ImageSettings::default(),
             clip: Clip::default(),
-            transfer: TransferSettings::default(),
-            further: Vec::new(),
             shading: Shading::default(),
             splatting: Splatting { classification: Classification::Auto, ..Splatting::default() },
             fitting: Fitting::ALL,
         }
+    }
+
+    /// The scene with another source of its first channel's volume.
+    pub fn with_volume(mut self, volume: VolumeSource) -> Self {
+        self.channels.first_mut().volume = volume;
+        self
+    }
+
+    /// The scene with another transfer function of its first channel.
+    pub fn with_transfer(mut self, transfer: impl Into<TransferSettings>) -> Self {
+        self.channels.first_mut().transfer = transfer.into();
+        self
     }
 }

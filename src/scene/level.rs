@@ -55,7 +55,7 @@ impl Scene {
         let mut scene = self.clone();
         let mut drawn = None;
         for (number, levels) in open {
-            // Further channels are drawn on the first one's grid.
+            // All channels are drawn on the first one's grid.
             let pixel = |grid: &Grid| self.pixel(&camera, &levels[0], drawn.as_ref().unwrap_or(grid));
             let level = coarsest(&levels, pixel);
             if number == 0 {
@@ -75,17 +75,14 @@ impl Scene {
 
     /// States the level of a channel.
     fn state_level(&mut self, channel: usize, level: usize) {
-        let stated = match channel.checked_sub(1) {
-            Some(further) => &mut self.further[further].level,
-            None => &mut self.level,
-        };
-        *stated = Some(level as u32);
+        self.channels[channel].level = Some(level as u32);
     }
 
     /// The level that the scene states, or else that of a volume which comes from a file with several.
     pub(super) fn level_in(&self, volume: &Volume) -> Option<u32> {
-        let has_levels = matches!(self.volume, VolumeSource::File(_)) && volume.levels().len() > 1;
-        self.level.or(has_levels.then(|| volume.level()))
+        let first = self.channels.first();
+        let has_levels = matches!(first.volume, VolumeSource::File(_)) && volume.levels().len() > 1;
+        first.level.or(has_levels.then(|| volume.level()))
     }
 }
 
@@ -123,7 +120,7 @@ fn open_channels(scene: &Scene, options: &ReadOptions) -> Result<Vec<Open>, Volu
         levels => Ok(levels.unwrap_or_default()),
     };
     let mut open = Vec::new();
-    for (number, channel) in scene.channels().enumerate() {
+    for (number, channel) in scene.channels.iter().enumerate() {
         let (VolumeSource::File(path), None) = (&channel.volume, channel.level) else { continue };
         let mut grids = of_file(path)?;
         if let Some(labels) = &channel.labels {
@@ -147,10 +144,10 @@ fn coarse_volume(scene: &Scene, open: &[Open], options: &ReadOptions) -> Result<
     let bytes = FRAME_BYTES.min(options.memory_limit() / 8);
     let is_small = |grid: &Grid| grid.voxels().saturating_mul(4) <= bytes;
     if open.iter().any(|(_, levels)| !levels.iter().any(is_small))
-        && let Some(Ok((first, further))) = load::streamed(scene, &Access::new(options)?)
-        && check_grids((&first, &further)).is_ok()
+        && let Some(Ok(channels)) = load::streamed(scene, &Access::new(options)?)
+        && check_grids(&channels).is_ok()
     {
-        return sample_of_channels((&first, &further), bytes);
+        return sample_of_channels(&channels, bytes);
     }
     let mut coarse = scene.clone();
     for (number, levels) in open {

@@ -1,6 +1,5 @@
 //! Loading the volumes of a scene's channels.
 
-use std::borrow::Cow;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -9,29 +8,34 @@ use glam::DVec3;
 use super::{Channel, Scene, VolumeSource};
 use crate::appearance::{Preset, categories};
 use crate::volume::{
-    self, Access, AdaptedStore, Resampling, Selection, Store, StreamedChannel, StreamedLevel, Volume, VolumeError,
-    builtin, raw_store,
+    self, Access, AdaptedStore, Channels, Resampling, Selection, Store, StreamedChannel, StreamedLevel, Volume,
+    VolumeError, builtin, raw_store,
 };
 
 /// The scene's volume with all channels, on the first one's grid.
 pub(super) fn channels(scene: &Scene, access: &Access) -> Result<Volume, VolumeError> {
-    let mut channels = scene.channels();
-    let Some(first) = channels.next() else { return Err(in_memory("volume")) };
-    let volume = channel(&first, "volume", access)?;
-    let is_own = |channel: &Channel| channel.volume == VolumeSource::Memory;
-    if scene.further.iter().all(is_own) {
+    let [first, others @ ..] = named(scene) else { return Err(in_memory("volume")) };
+    let volume = channel(first, "volume", access)?;
+    if others.is_empty() {
         return Ok(volume);
     }
-    single(volume.channels().count(), 0, &first)?;
-    let further = (1..).zip(&scene.further).map(|(number, settings)| {
+    single(volume.channel_count(), 0, first)?;
+    let others = (1..).zip(others).map(|(number, settings)| {
         let key = format!("channel[{number}].volume");
         let own = channel(settings, &key, access)?;
-        single(own.channels().count(), number, settings)?;
+        single(own.channel_count(), number, settings)?;
         let resampling = if has_labels_for_values(settings, &own) { Resampling::Nearest } else { Resampling::Linear };
         own.onto(&volume, resampling, (&key, Path::new(&origin(&settings.volume))), access)
     });
-    let further = further.collect::<Result<_, VolumeError>>()?;
-    volume.with_channels(&origin(&first.volume), further)
+    let others = others.collect::<Result<_, VolumeError>>()?;
+    volume.with_channels(&origin(&first.volume), others)
+}
+
+/// The channels that name volumes: all, or the first one where the others are its volume's.
+fn named(scene: &Scene) -> &[Channel] {
+    let is_own = |channel: &Channel| channel.volume == VolumeSource::Memory;
+    let named = if scene.channels[1..].iter().all(is_own) { 1 } else { scene.channels.len() };
+    &scene.channels[..named]
 }
 
 /// Whether the values of a channel's volume are labels, of which none lies between two others.
@@ -42,11 +46,7 @@ pub(super) fn has_labels_for_values(settings: &Channel, volume: &Volume) -> bool
 
 /// The scene's volume to be read by boxes; `None` if it has several channels or labels, or is no file.
 pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Store>, VolumeError>> {
-    let mut channels = scene.channels();
-    let (first, None) = (channels.next()?, channels.next()) else { return None };
-    if first.labels.is_some() {
-        return None;
-    }
+    let [first @ Channel { labels: None, .. }] = &*scene.channels else { return None };
     let access = access
         .selecting(Selection { channel: first.index, time: first.time, level: None })
         .of_series(first.series.as_deref());
@@ -58,36 +58,29 @@ pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Sto
     Some(store.and_then(|store| spaced(&origin(&first.volume), store, first.spacing)))
 }
 
-/// A scene's channels to be read by boxes: the first one, and those after it.
-pub(super) type Streamed = (StreamedChannel, Vec<StreamedChannel>);
-
 /// The channels that a scene names, or all of the only file that it names, to be read by boxes; `None` if one of them comes from no file.
 ///
 /// # Errors
 /// If a file cannot be read by boxes, lacks what is selected, or holds several channels where several channels name volumes.
-pub(super) fn streamed(scene: &Scene, access: &Access) -> Option<Result<Streamed, VolumeError>> {
-    let is_own = |channel: &Channel| channel.volume == VolumeSource::Memory;
-    let named = if scene.further.iter().all(is_own) { 1 } else { 1 + scene.further.len() };
-    let named: Vec<Cow<Channel>> = scene.channels().take(named).collect();
-    let is_file = |channel: &Cow<Channel>| matches!(channel.volume, VolumeSource::File(_) | VolumeSource::Raw(..));
-    let (first, further) = named.split_first()?;
-    named.iter().all(is_file).then(|| {
-        let (channel, own) = streamed_file(first, access)?;
-        if further.is_empty() {
-            return Ok((channel, own));
+pub(super) fn streamed(scene: &Scene, access: &Access) -> Option<Result<Channels<StreamedChannel>, VolumeError>> {
+    let is_file = |channel: &Channel| matches!(channel.volume, VolumeSource::File(_) | VolumeSource::Raw(..));
+    let (first, others) = named(scene).split_first()?;
+    named(scene).iter().all(is_file).then(|| {
+        let mut channels = streamed_file(first, access)?;
+        if !others.is_empty() {
+            single(channels.len(), 0, first)?;
         }
-        single(1 + own.len(), 0, first)?;
-        let others = (1..).zip(further).map(|(number, settings)| {
-            let (channel, own) = streamed_file(settings, access)?;
-            single(1 + own.len(), number, settings)?;
-            Ok(channel)
-        });
-        Ok((channel, others.collect::<Result<_, VolumeError>>()?))
+        for (number, settings) in (1..).zip(others) {
+            let own = streamed_file(settings, access)?;
+            single(own.len(), number, settings)?;
+            own.into_iter().for_each(|channel| channels.push(channel));
+        }
+        Ok(channels)
     })
 }
 
 /// The selected channels of a file, the first of them with the labels of its settings.
-fn streamed_file(settings: &Channel, access: &Access) -> Result<Streamed, VolumeError> {
+fn streamed_file(settings: &Channel, access: &Access) -> Result<Channels<StreamedChannel>, VolumeError> {
     let level = settings.level.unwrap_or(0);
     let own = access
         .selecting(Selection { channel: settings.index, time: settings.time, level: None })
@@ -101,13 +94,15 @@ fn streamed_file(settings: &Channel, access: &Access) -> Result<Streamed, Volume
         let store = spaced(&origin, store, settings.spacing)?;
         Ok(StreamedLevel::new(origin, store, level as usize))
     };
-    let mut channels = stores.into_iter().map(|store| streamed(origin(&settings.volume), store).map(Into::into));
     // Every file has a channel.
-    let first: StreamedChannel = channels.next().unwrap_or_else(|| Err(in_memory("volume")))?;
-    let further = channels.collect::<Result<_, VolumeError>>()?;
-    let Some(path) = &settings.labels else { return Ok((first, further)) };
-    let labels = volume::store(path, &access.whole_at(level))?;
-    Ok((first.with_labels(streamed(path.display().to_string(), labels)?)?, further))
+    let stores = Channels::of(stores).ok_or_else(|| in_memory("volume"))?;
+    let mut channels: Channels<StreamedChannel> =
+        stores.try_map(|store| streamed(origin(&settings.volume), store).map(Into::into))?;
+    if let Some(path) = &settings.labels {
+        let labels = streamed(path.display().to_string(), volume::store(path, &access.whole_at(level))?)?;
+        *channels.first_mut() = channels.first().clone().with_labels(labels)?;
+    }
+    Ok(channels)
 }
 
 /// A store with the spacing that a scene states, if it states one.

@@ -46,7 +46,7 @@ use crate::settings::framing::{Extent, Sphere};
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::TransferFunction;
-use crate::volume::{Access, ReadOptions, Store, Volume, VolumeError};
+use crate::volume::{Access, Channels, ReadOptions, Store, Volume, VolumeError};
 use overrides::apply_override;
 use reader::{OVERRIDE, Origins, Section};
 
@@ -151,28 +151,31 @@ impl Scene {
     }
 
     /// `fit` gives the camera for a transfer function and an image's size, or `None` if it stays.
-    fn explicit_by(&self, volume: &Volume, fit: impl Fn(&Self, &TransferFunction, [u32; 2]) -> Option<Camera>) -> Self {
+    fn explicit_by(
+        &self,
+        volume: &Volume,
+        fit: impl Fn(&Self, &[TransferFunction], [u32; 2]) -> Option<Camera>,
+    ) -> Self {
         let settled = self.settled(volume);
         let ImageSettings { width, height, .. } = self.image;
         let camera = fit(&settled, &settled.resolve(volume), [width, height]).unwrap_or(settled.camera);
         let camera = camera.explicit(volume.drawn_grid(), self.splatting.radius, width, height);
-        let mut channels = settled.explicit_channels(volume).into_iter();
-        let Some(Channel { name, transfer, .. }) = channels.next() else { return self.clone() };
-        let level = self.level_in(volume);
-        Self { level, camera, name, transfer, further: channels.collect(), ..settled }
+        let mut channels = settled.explicit_channels(volume);
+        channels.first_mut().level = self.level_in(volume);
+        Self { camera, channels, ..settled }
     }
 
     /// The box that a camera fits under a transfer function (for a scene that leaves it to the volume, that of
     /// [`Self::resolve`]): the box around the kernels of all voxels that take part and are not cut away. If the opacity was
     /// chosen automatically, the outermost 0.1 % of them at either end of each axis are ignored as noise. `None` if the camera needs no such
     /// box, or no voxel takes part.
-    pub fn extent(&self, volume: &Volume, transfer: &TransferFunction) -> Option<Extent> {
+    pub fn extent(&self, volume: &Volume, transfer: &[TransferFunction]) -> Option<Extent> {
         let voxels = self.shown_voxels(volume, transfer)?;
         Some(Extent::of_voxels(volume.grid(), voxels, self.splatting.radius))
     }
 
     /// The sphere about the middle of [`Self::extent`] that holds these voxels and their kernels, for cameras that turn. `None` as there.
-    pub fn sphere(&self, volume: &Volume, transfer: &TransferFunction) -> Option<Sphere> {
+    pub fn sphere(&self, volume: &Volume, transfer: &[TransferFunction]) -> Option<Sphere> {
         let (grid, kernel) = (volume.grid(), self.splatting.radius);
         let voxels = self.shown_voxels(volume, transfer)?;
         let farthest = extent::farthest(volume, transfer, &self.clip.voxels(grid, kernel), voxels);
@@ -181,20 +184,20 @@ impl Scene {
     }
 
     /// The first and the last voxel of the box that a camera fits; `None` as for [`Self::extent`].
-    fn shown_voxels(&self, volume: &Volume, transfer: &TransferFunction) -> Option<[UVec3; 2]> {
+    fn shown_voxels(&self, volume: &Volume, transfer: &[TransferFunction]) -> Option<[UVec3; 2]> {
         /// The ignored fraction of voxels at either end of each axis.
         const SPECKS: f64 = 0.001;
         if !self.camera.needs_object() {
             return None;
         }
         let clipped = self.clip.voxels(volume.grid(), self.splatting.radius);
-        let specks = if self.channels().any(|channel| channel.transfer.opacity.is_none()) { SPECKS } else { 0.0 };
+        let specks = if self.channels.iter().any(|channel| channel.transfer.opacity.is_none()) { SPECKS } else { 0.0 };
         extent::of_voxels(volume, transfer, &clipped, specks)
     }
 
     /// The eye that a volume chooses for the camera; `None` if the scene states its direction or up.
     pub fn eye(&self, volume: &Volume) -> Option<Eye> {
-        self.camera.has_open_eye().then(|| Eye::of(volume, self.fitted(volume).transfer.preset))
+        self.camera.has_open_eye().then(|| Eye::of(volume, self.fitted(volume).channels.first().transfer.preset))
     }
 
     /// The camera with the direction and up that a volume chooses ([`Self::eye`]), or its own.
@@ -203,7 +206,7 @@ impl Scene {
     }
 
     /// The scene with a camera that no longer depends on the object.
-    pub(crate) fn framed(&self, volume: &Volume, transfer: &TransferFunction) -> Self {
+    pub(crate) fn framed(&self, volume: &Volume, transfer: &[TransferFunction]) -> Self {
         let ImageSettings { width, height, .. } = self.image;
         let settled = self.settled(volume);
         let extent = settled.extent(volume, transfer);
@@ -222,7 +225,7 @@ impl Scene {
         if self.is_fitting() {
             return self.fitted(volume).classification(volume);
         }
-        let are_several = !volume.further().is_empty();
+        let are_several = volume.channel_count() > 1;
         let is_sharper = (0..).zip(volume.channels()).all(|(number, volume)| {
             let transfer = &self.settings_of(number).transfer;
             match transfer.preset {
@@ -246,11 +249,13 @@ impl Scene {
             Shading { light_step, ..shading }
         };
         if !self.is_fitting() {
-            let shading = self.transfer.preset.map_or(self.shading, |preset| step(self.shading, preset));
+            let shading =
+                self.channels.first().transfer.preset.map_or(self.shading, |preset| step(self.shading, preset));
             return Self { shading, ..self.clone() };
         }
         let preset = Preset::suggested(volume).unwrap_or(Preset::None);
-        let transfer = TransferSettings { preset: Some(preset), ..self.transfer.clone() };
+        let fitted =
+            self.clone().with_transfer(TransferSettings { preset: Some(preset), ..TransferSettings::default() });
         // The surface that stands out of the builtin head is its skin.
         let lit_by = if preset == Preset::None && is_builtin_head(volume) { Preset::CtSkin } else { preset };
         let shading = step(self.fitting.shading(self.shading, lit_by), lit_by);
@@ -259,12 +264,14 @@ impl Scene {
         if splatting.classification == Classification::Auto && exceeds_digits(volume) {
             splatting.classification = Classification::Before;
         }
-        Self { transfer, clip, shading, splatting, fitting: Fitting::NONE, ..self.clone() }
+        Self { clip, shading, splatting, fitting: Fitting::NONE, ..fitted }
     }
 
     /// Whether the preset that fits is used.
     fn is_fitting(&self) -> bool {
-        self.fitting.is_open && self.further.is_empty() && self.transfer == TransferSettings::default()
+        self.fitting.is_open
+            && self.channels.len() == 1
+            && self.channels.first().transfer == TransferSettings::default()
     }
 
     /// The scene with a preset, a classification, and a direction of its camera, that no longer depend on the volume.
@@ -312,35 +319,24 @@ impl Scene {
             },
             ..Splatting::default()
         };
-        let mut channels = tables::channels(channels, folder, source, preset)?.into_iter();
+        let channels = tables::channels(channels, folder, source, preset)?;
         let is_open = preset.is_none() && !states_transfer && channels.len() <= 1;
         let unstated = tables::fitting(&shading, &splatting, &clip);
         let of_preset = Fitting { light_step: preset.is_some() && unstated.light_step, ..Fitting::NONE };
         let fitting = if is_open { unstated } else { of_preset };
-        let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } =
-            channels.next().unwrap_or_else(|| Channel::new(VolumeSource::Memory));
         let scene = Self {
-            volume,
-            spacing,
-            labels,
-            index,
-            time,
-            level,
-            series,
-            name,
-            visible,
+            channels: Channels::of(channels).unwrap_or_else(|| Channel::new(VolumeSource::Memory).into()),
             camera: tables::camera(camera, camera_by_default)?,
             image: tables::image(image)?,
             clip: tables::clip(clip, preset.map_or_else(Clip::default, Preset::clip))?,
-            transfer,
-            further: channels.collect(),
             shading: tables::shading(shading, preset.map_or_else(Shading::default, Preset::shading))?,
             splatting: tables::splatting(splatting, splatting_of_preset)?,
             fitting,
         };
+        scene.check_tables().map_err(|error| origins.refused(error))?;
         let whole = |error: SettingError| origins.invalid(&error.key, &[], error.found.to_string(), error.allowed);
         scene.check_membership().map_err(whole)?;
-        if scene.transfer.preset == Some(Preset::Labels) && scene.splatting.classification == Classification::After {
+        if preset == Some(Preset::Labels) && scene.splatting.classification == Classification::After {
             let (key, found) = ("splatting.classification", "\"after\" with preset = \"labels\"");
             return Err(origins.invalid(key, &["preset"], found, "\"before\" with it"));
         }

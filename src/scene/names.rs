@@ -23,15 +23,7 @@ pub(super) const GRADIENTS: &[(&str, Gradient)] =
     &[("differences", Gradient::Differences), ("kernel", Gradient::Kernel), ("membership", Gradient::Membership)];
 pub(super) const FORMS: &[(&str, FootprintForm)] =
     &[("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
-pub(crate) const COMPOSITINGS: &[(&str, Compositing)] = &[
-    ("linear", Compositing::Linear),
-    ("exponential", Compositing::Exponential),
-    ("xray", Compositing::Xray),
-    ("maximum", Compositing::Maximum),
-    ("minimum", Compositing::Minimum),
-    ("average", Compositing::Average),
-    ("surface", Compositing::Surface),
-];
+pub(crate) const COMPOSITINGS: &[(&str, Compositing)] = &Compositing::ALL;
 /// Whether the most significant byte of a sample comes first.
 pub(super) const ENDIANS: &[(&str, bool)] = &[("little", false), ("big", true)];
 pub(crate) const ORDERS: &[(&str, Order)] =

@@ -23,7 +23,8 @@ impl Scene {
     pub fn only(&self, label: &str, volume: &Volume) -> Result<Self, SettingError> {
         let refused = |allowed: String| SettingError::new(KEY, format!("\"{label}\""), allowed);
         let mut scene = self.fitted(volume);
-        let is_map = || scene.transfer.preset == Some(Preset::Labels) || categories::is_label_map(volume);
+        let is_map =
+            || scene.channels.first().transfer.preset == Some(Preset::Labels) || categories::is_label_map(volume);
         let names = volume.label_names();
         let mut chosen: BTreeSet<u16> =
             names.iter().filter(|(_, name)| *name == label).map(|(&label, _)| label).collect();
@@ -39,8 +40,9 @@ impl Scene {
                 if chosen.is_disjoint(&present) {
                     return Err(refused(allowed(volume, present)));
                 }
+                let of_labels = &mut scene.channels.first_mut().transfer.labels;
                 for label in present {
-                    scene.transfer.labels.entry(volume.label_id(label)).or_default().visible = chosen.contains(&label);
+                    of_labels.entry(volume.label_id(label)).or_default().visible = chosen.contains(&label);
                 }
             }
             None if is_map() => {
@@ -49,7 +51,7 @@ impl Scene {
                     return Err(refused(allowed(volume, present)));
                 }
                 let ids = chosen.iter().map(|&label| volume.label_id(label) as f64);
-                scene.transfer.iso_ranges = Some(ids.map(|id| [id, id]).collect());
+                scene.channels.first_mut().transfer.iso_ranges = Some(ids.map(|id| [id, id]).collect());
             }
             None => return Err(refused("a label map, or a volume with labels".to_owned())),
         }

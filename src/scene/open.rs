@@ -41,13 +41,10 @@ impl OpenVolume {
         }
     }
 
-    /// One of its channels by itself.
-    ///
-    /// # Panics
-    /// If it has no such channel.
+    /// One of its channels by itself, given by its number; the volume must have it.
     pub(crate) fn of_channel(&self, number: usize) -> Self {
         match self {
-            Self::Whole(volume) => number.checked_sub(1).map_or(&**volume, |at| &volume.further()[at]).alone().into(),
+            Self::Whole(volume) => volume.channel(number).unwrap_or(volume).alone().into(),
             Self::Streamed(volume) => Self::Streamed(volume.of_channel(number)),
         }
     }
@@ -113,7 +110,7 @@ impl Scene {
         let sample = &volume.sample;
         // Whether each channel has labels, and whether it has colours.
         let of_stores: Vec<[bool; 2]> =
-            volume.channels().map(|of| [of.labels.is_some(), of.values.store.has_colors()]).collect();
+            volume.channels.iter().map(|of| [of.labels.is_some(), of.values.store.has_colors()]).collect();
         let of_sample: Vec<[bool; 2]> =
             sample.channels().map(|of| [of.labels().is_some(), of.colors().is_some()]).collect();
         if of_stores != of_sample {
@@ -146,7 +143,7 @@ impl Scene {
 /// If channels or labels lie on several grids, the index is of none of them, or their sample cannot be read.
 fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Option<StreamedVolume>, VolumeError> {
     let memory = options.memory_limit();
-    let (mut first, mut further) = match (load::streamed(scene, access), &options.index) {
+    let mut channels = match (load::streamed(scene, access), &options.index) {
         (Some(Ok(channels)), _) => channels,
         (_, None) => return Ok(None),
         (None, Some(path)) => {
@@ -166,12 +163,12 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
         // The text, and up to five times as many bytes of ranges.
         let text = access.text(path, memory / 8)?.map_err(|source| VolumeError::io(path, source))?;
         let origin = path.display().to_string();
-        StreamedVolume::index((&mut first, &mut further), StoreIndex::decode(&origin, &text)?, &origin)?;
+        StreamedVolume::index(&mut channels, StoreIndex::decode(&origin, &text)?, &origin)?;
     }
     let (mut bytes, mut largest) = (0, 0_u64);
     let of_voxels =
         |dims: UVec3, each: u64| dims.to_array().into_iter().fold(each, |all, n| all.saturating_mul(n.into()));
-    for channel in std::iter::once(&first).chain(&further) {
+    for channel in &channels {
         for (of, is_labels) in [(Some(&channel.values), false), (channel.labels.as_ref(), true)] {
             let Some(StreamedLevel { store, level, .. }) = of else { continue };
             let Some(of) = store.levels().get(*level) else { return Ok(None) };
@@ -186,5 +183,5 @@ fn streamed(scene: &Scene, options: &ReadOptions, access: &Access) -> Result<Opt
     if bytes <= memory || least > memory / 2 {
         return Ok(None);
     }
-    StreamedVolume::of_channels(first, further, memory).map(Some)
+    StreamedVolume::of_channels(channels, memory).map(Some)
 }

@@ -92,14 +92,14 @@ fn channel_table(root: &mut Table, number: usize) -> &mut Value {
 /// of the only channel that is read leaves that channel's table alone, if all tables are about channels of one file.
 fn adapt_channels(channels: &mut Vec<Value>, key: &str, value: &Value) {
     let key = key.trim_start_matches('.');
-    let Some((first, further)) = channels.split_first_mut() else { return };
+    let Some((first, others)) = channels.split_first_mut() else { return };
     let source = |channel: &Value| {
         let volume = channel.get("volume")?;
         volume.get("path").or_else(|| volume.get("builtin")).cloned()
     };
     if OF_WHOLE_FILE.contains(&key) {
         let of_first = source(first);
-        for channel in further.iter_mut().filter(|channel| of_first.is_some() && source(channel) == of_first) {
+        for channel in others.iter_mut().filter(|channel| of_first.is_some() && source(channel) == of_first) {
             if let Some(Value::Table(volume)) = channel.get_mut("volume") {
                 volume.insert(key.to_owned(), value.clone());
             }
@@ -107,7 +107,7 @@ fn adapt_channels(channels: &mut Vec<Value>, key: &str, value: &Value) {
     }
     let number = value.as_integer().and_then(|number| usize::try_from(number).ok());
     if key == "index"
-        && let Some(number) = number.filter(|_| further.iter().all(|channel| source(channel).is_none()))
+        && let Some(number) = number.filter(|_| others.iter().all(|channel| source(channel).is_none()))
         && let Some(volume) = first.get("volume").cloned()
     {
         let only = channels.get(number).and_then(Value::as_table).cloned();

@@ -234,9 +234,7 @@ pub(super) fn image(mut section: Section) -> Result<ImageSettings, SceneError> {
     section.read("width", &mut image.width, Entry::pixels)?;
     section.read("height", &mut image.height, Entry::pixels)?;
     section.read("background", &mut image.background, rgba)?;
-    let origins = section.origins;
     section.finish()?;
-    image.check().map_err(|error| origins.refused(error))?;
     Ok(image)
 }
 
@@ -245,9 +243,7 @@ pub(super) fn clip(mut section: Section, mut clip: Clip) -> Result<Clip, SceneEr
     section.read("planes", &mut clip.planes, planes)?;
     section.read("crop", &mut clip.crop, |entry| crop(entry).map(Some))?;
     section.read("shade_faces", &mut clip.shade_faces, Entry::boolean)?;
-    let origins = section.origins;
     section.finish()?;
-    clip.check().map_err(|error| origins.refused(error))?;
     Ok(clip)
 }
 
@@ -331,9 +327,7 @@ pub(super) fn shading(mut section: Section, mut shading: Shading) -> Result<Shad
     section.read("shadow", &mut shading.shadow, |entry| entry.number(Interval::SHARE))?;
     section.read("shadow_spread", &mut shading.shadow_spread, |entry| entry.number(LIGHT_SPREAD))?;
     section.read("light_step", &mut shading.light_step, |entry| entry.number(LIGHT_STEP))?;
-    let origins = section.origins;
     section.finish()?;
-    shading.check().map_err(|error| origins.refused(error))?;
     Ok(shading)
 }
 
@@ -377,9 +371,7 @@ pub(super) fn splatting(mut section: Section, mut splatting: Splatting) -> Resul
     for (key, former) in KEYS {
         section.moved(former, key)?;
     }
-    let origins = section.origins;
     section.finish()?;
-    splatting.check().map_err(|error| origins.refused(error))?;
     Ok(splatting)
 }
 

@@ -32,18 +32,17 @@ pub struct TransferSettings {
 }
 
 impl From<TransferFunction> for TransferSettings {
-    /// Settings that state everything about one channel, whose labels are their own numbers; further channels are ignored.
+    /// Settings that state everything, with labels that are their own numbers.
     fn from(transfer: TransferFunction) -> Self {
         Self::numbered(transfer, &u64::from)
     }
 }
 
 impl TransferSettings {
-    /// Settings that state everything about one channel, given the number of each label.
+    /// Settings that state everything, given the number of each label.
     fn numbered(transfer: TransferFunction, number: &dyn Fn(u16) -> u64) -> Self {
         // Whether values are labels is the volume's own.
-        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, membership: _, further: _ } =
-            transfer;
+        let TransferFunction { color, opacity, gradient_opacity, iso_ranges, labels, membership: _ } = transfer;
         let (color, opacity) = (Some(color), Some(opacity));
         let mut numbered = BTreeMap::new();
         for (label, tables) in labels {

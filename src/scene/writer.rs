@@ -32,16 +32,17 @@ impl Scene {
     /// # Errors
     /// If the path of the volume or of its labels is not UTF-8, or the offset in a raw file exceeds TOML's integers.
     pub fn to_toml(&self, folder: &Path) -> Result<String, SceneError> {
-        let Self { camera, image, clip, transfer, shading, splatting, fitting, .. } = self;
+        let Self { channels, camera, image, clip, shading, splatting, fitting } = self;
+        let Channel { name, visible, transfer, .. } = channels.first();
         let mut text = Text::default();
         if let Some(preset) = transfer.preset {
             text.line("preset", name_of(&Preset::ALL, preset));
         }
         // One channel without a name has no need of a table.
-        let is_one = self.further.is_empty() && self.name.is_none() && self.visible;
-        for (number, channel) in self.channels().enumerate() {
+        let is_one = channels.len() == 1 && name.is_none() && *visible;
+        for (number, channel) in channels.iter().enumerate() {
             text.channel = (!is_one).then_some(number);
-            write_channel(&mut text, folder, &channel)?;
+            write_channel(&mut text, folder, channel)?;
         }
         text.channel = None;
         // Without these tables the camera is this one again (SPEC §2).

@@ -1,6 +1,6 @@
 //! How a picture is finished where culling may have stopped its pixels (SPEC §6, closing).
 
-use super::splatting::{Compositing, Splatting};
+use super::splatting::Splatting;
 
 /// Fills the opacity that a pixel lacks beyond the threshold T with its own colour: entirely from T on, where it may stop in any slab, and less and less
 /// down to `2T - 1`. The share would show as dark steps along slabs otherwise.
@@ -14,10 +14,9 @@ impl Closing {
     /// that it never changes the picture.
     pub(crate) fn of(splatting: &Splatting) -> Option<Self> {
         let Splatting { compositing, culling, opacity_threshold, .. } = *splatting;
-        let composites = matches!(compositing, Compositing::Linear | Compositing::Exponential);
         // Thresholds that f32 rounds to 1, or nearly to 0, have no ramp.
         let threshold = opacity_threshold.max(1e-30) as f32;
-        (composites && culling && threshold < 1.0).then_some(Self { threshold })
+        (compositing.is_by_opacity() && culling && threshold < 1.0).then_some(Self { threshold })
     }
 
     /// The threshold T, above 0 and below 1.
@@ -42,6 +41,7 @@ impl Closing {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::settings::splatting::Compositing;
 
     /// SPEC §6: nothing below `2T - 1`, everything from T on, and within `1 - T` of any picture that continues behind the pixel.
     #[test]

@@ -19,7 +19,7 @@ pub struct Economies {
     pub whole_below: f64,
     /// β-acceleration: where every pixel in a kernel's box has reached this opacity, the kernel is projected whole, into the first group of
     /// sheets that it reaches. No channel changes by more than `1 - beta`. It works front to back only, and not for
-    /// [`Compositing::Surface`](super::splatting::Compositing::Surface). 1 turns this off.
+    /// `surface`. 1 turns this off.
     pub beta: f64,
     /// A footprint ends where it adds less than this to its sheet's alpha. 0 draws the whole kernel.
     pub resolution: f64,

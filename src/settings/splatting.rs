@@ -125,21 +125,92 @@ pub enum Compositing {
 
 impl Compositing {
     /// The number of variants.
-    pub const COUNT: usize = 7;
+    pub const COUNT: usize = Self::ALL.len();
+
+    /// All, with their names in scene files.
+    pub const ALL: [(&str, Self); 7] = [
+        ("linear", Self::Linear),
+        ("exponential", Self::Exponential),
+        ("xray", Self::Xray),
+        ("maximum", Self::Maximum),
+        ("minimum", Self::Minimum),
+        ("average", Self::Average),
+        ("surface", Self::Surface),
+    ];
 
     /// Whether the means of sheets count.
     pub fn is_by_means(self) -> bool {
-        matches!(self, Self::Maximum | Self::Minimum | Self::Average | Self::Surface)
+        self.is_choice() || self.has_surface()
     }
 
-    /// Whether after splatting one value is chosen for a pixel.
-    pub(crate) fn is_choice(self) -> bool {
-        matches!(self, Self::Maximum | Self::Minimum | Self::Average)
+    /// Whether sheets cover one another by their opacities (eq. 2).
+    pub fn is_by_opacity(self) -> bool {
+        matches!(self, Self::Linear | Self::Exponential)
+    }
+
+    /// Whether sheets are added up.
+    pub fn is_sum(self) -> bool {
+        matches!(self, Self::Xray | Self::Average)
+    }
+
+    /// Whether amounts are optical depths.
+    pub fn is_optical_depth(self) -> bool {
+        self == Self::Exponential
+    }
+
+    /// Whether the greatest or the least along a ray is kept.
+    pub fn is_extreme(self) -> bool {
+        matches!(self, Self::Maximum | Self::Minimum)
+    }
+
+    /// Whether the least along a ray is kept.
+    pub fn keeps_least(self) -> bool {
+        self == Self::Minimum
+    }
+
+    /// Whether the mean along a ray is shown.
+    pub fn is_average(self) -> bool {
+        self == Self::Average
+    }
+
+    /// Whether iso-surfaces are shown, at the first of which a ray ends.
+    pub fn has_surface(self) -> bool {
+        self == Self::Surface
+    }
+
+    /// Whether one value stands for all along a ray.
+    pub fn is_choice(self) -> bool {
+        self.is_extreme() || self.is_average()
+    }
+
+    /// Whether one of the values along a ray is chosen and then classified (SPEC §9).
+    pub fn chooses_values(self, classification: Classification) -> bool {
+        self.is_choice() && classification == Classification::After
+    }
+
+    /// Whether the mean of the values along a ray is classified (SPEC §9).
+    pub fn shows_means(self, classification: Classification) -> bool {
+        self.is_average() && classification == Classification::After
+    }
+
+    /// Whether sheets count where they are empty: before splatting, these are minima.
+    pub fn counts_empty(self, classification: Classification) -> bool {
+        self.keeps_least() && classification != Classification::After
+    }
+
+    /// Whether values without an opacity change pixels, because one of all along a ray is chosen, or the least sheet, which may show nothing.
+    pub fn counts_all_values(self, classification: Classification) -> bool {
+        self.keeps_least() || self.chooses_values(classification)
+    }
+
+    /// The compositing by which the compositing buffer becomes an image: after splatting sums are clamped, and all others are premultiplied RGBA already.
+    pub(crate) fn finished_as(self, classification: Classification) -> Self {
+        if classification == Classification::After && self != Self::Xray { Self::Linear } else { self }
     }
 
     /// Whether opaque pixels hide what lies behind them; otherwise nothing can be culled (§6).
     pub fn hides(self) -> bool {
-        matches!(self, Self::Linear | Self::Exponential | Self::Surface)
+        self.is_by_opacity() || self.has_surface()
     }
 }
 
@@ -235,11 +306,26 @@ impl Splatting {
             let found = format!("\"{name}\" with splatting.method = \"composite-every-sample\"");
             return refused(found, "\"linear\", \"exponential\" or \"xray\" with it, or a method with sheets");
         }
-        if self.compositing == Compositing::Surface && self.order == Order::BackToFront {
+        if self.compositing.has_surface() && self.order == Order::BackToFront {
             let found = format!("\"{name}\" with splatting.order = \"back-to-front\"");
             return refused(found, "\"front-to-back\" with it");
         }
         if self.classification == Classification::After { self.check_after() } else { Ok(()) }
+    }
+
+    /// Whether what is drawn hides what comes later (SPEC §5): front to back, with a compositing that hides.
+    pub(crate) fn hides(&self) -> bool {
+        self.order == Order::FrontToBack && self.compositing.hides()
+    }
+
+    /// The opacity from which pixels count as opaque. While no surface has been reached, alpha is a mean below one half; a surface itself is opaque.
+    pub(crate) fn opaque_from(&self) -> f64 {
+        if self.compositing.has_surface() { 1.0 } else { self.opacity_threshold }
+    }
+
+    /// [`Self::opaque_from`], if what lies behind opaque pixels is not drawn.
+    pub(crate) fn culls_from(&self) -> Option<f64> {
+        (self.culling && self.hides()).then(|| self.opaque_from())
     }
 
     /// The number of segments of a slab after splatting, along each of which values run linearly.
@@ -257,9 +343,7 @@ impl Splatting {
         match self.interpolation {
             Interpolation::Smooth => false,
             Interpolation::Exact => true,
-            Interpolation::Auto => {
-                matches!(self.compositing, Compositing::Maximum | Compositing::Minimum) && self.allows_exact()
-            }
+            Interpolation::Auto => self.compositing.is_extreme() && self.allows_exact(),
         }
     }
 
@@ -291,7 +375,7 @@ impl Splatting {
             return refused("splatting.method", found, "a method with sheets");
         }
         let Some(opacity) = first_hit else { return Ok(()) };
-        if self.compositing == Compositing::Minimum {
+        if self.compositing.keeps_least() {
             let allowed = "another compositing: the minimum is known only at the end of a ray";
             return refused("splatting.compositing", "\"minimum\" with first hits", allowed);
         }

@@ -89,7 +89,8 @@ impl<T: Copy + Add<Output = T> + Mul<f64, Output = T>> Ramp<T> {
     }
 }
 
-/// The appearance of a voxel by its value, its gradient and, in a segmented volume, its label.
+/// The appearance of a channel's voxels by their values, gradients and, in a segmented volume, labels. Functions that take those of a volume's channels draw
+/// as many channels as they are given.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TransferFunction {
     /// Red, green and blue in [0, 1] over voxel values.
@@ -105,9 +106,6 @@ pub struct TransferFunction {
     pub membership: bool,
     /// Tables for single labels of a segmented volume. Labels without tables use the ramps above. Other volumes ignore them.
     pub labels: BTreeMap<u16, LabelTables>,
-    /// The transfer functions of the volume's further channels ([`Volume::further`](crate::Volume::further)), in their order. These have no
-    /// further ones themselves. A further channel without one is not drawn.
-    pub further: Vec<TransferFunction>,
 }
 
 /// A label's own tables.
@@ -320,9 +318,15 @@ impl TransferFunction {
     /// reversed or not finite, or there are more control points, iso-ranges or labels' tables than are drawn (65 536 points of colours, 4096 of others,
     /// 4096 iso-ranges, 524 288 pieces of all tables).
     pub fn check(&self) -> Result<(), SettingError> {
-        self.check_as("transfer")?;
-        check_pieces("transfer", self.channels().map(Self::parts))?;
-        (1..).zip(&self.further).try_for_each(|(number, of)| of.check_as(&format!("channel[{number}].transfer")))
+        Self::check_channels(std::slice::from_ref(self))
+    }
+
+    /// [`Self::check`] of the transfer functions of several channels.
+    pub(crate) fn check_channels(channels: &[Self]) -> Result<(), SettingError> {
+        for (number, of) in channels.iter().enumerate() {
+            of.check_as(&if number == 0 { "transfer".to_owned() } else { format!("channel[{number}].transfer") })?;
+        }
+        check_pieces("transfer", channels.iter().map(Self::parts))
     }
 
     /// [`Self::check`] of one channel, whose tables have a name in errors.
@@ -340,8 +344,8 @@ impl TransferFunction {
 
     /// A transfer function with only colour and opacity.
     pub(crate) fn by_value(color: Ramp<DVec3>, opacity: Ramp<f64>) -> Self {
-        let (labels, further) = (BTreeMap::new(), Vec::new());
-        Self { color, opacity, gradient_opacity: None, iso_ranges: None, membership: false, labels, further }
+        let labels = BTreeMap::new();
+        Self { color, opacity, gradient_opacity: None, iso_ranges: None, membership: false, labels }
     }
 
     /// A transfer function without any opacity.
@@ -349,26 +353,15 @@ impl TransferFunction {
         Self::by_value(Ramp::through(vec![(0.0, DVec3::ZERO)]), Ramp::through(vec![(0.0, 0.0)]))
     }
 
-    /// The transfer functions of all channels of a volume, the first one's first.
-    pub fn channels(&self) -> impl Iterator<Item = &Self> {
-        std::iter::once(self).chain(&self.further)
-    }
-
-    /// Whether any channel's voxels have normals of the membership of their labels.
+    /// Whether any voxels have normals of the membership of their labels.
     pub(crate) fn has_membership(&self) -> bool {
-        self.channels().any(|channel| channel.membership || channel.labels.values().any(|tables| tables.membership))
+        self.membership || self.labels.values().any(|tables| tables.membership)
     }
 
-    /// Whether the opacity of any of this channel's voxels depends on its gradient.
+    /// Whether the opacity of any voxels depends on its gradient.
     #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
     pub(crate) fn is_by_gradient(&self) -> bool {
         self.gradient_opacity.is_some() || self.labels.values().any(|tables| tables.gradient_opacity.is_some())
-    }
-
-    /// The transfer function of one channel by itself.
-    pub(crate) fn of_channel(&self, number: usize) -> Self {
-        let own = number.checked_sub(1).map_or(self, |at| &self.further[at]);
-        Self { further: Vec::new(), ..own.clone() }
     }
 
     /// The tables that apply to voxels of a label; `None` means those of a volume that is not segmented.

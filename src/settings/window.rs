@@ -107,7 +107,7 @@ impl Window {
     /// The same window with the slab before its first, if the compositing finds surfaces between the middles of neighbouring slabs (SPEC §5).
     #[cfg(any(feature = "cpu", feature = "gpu"))]
     pub(crate) fn with_lead(&self, compositing: Compositing, classification: Classification) -> Self {
-        let is_between = compositing == Compositing::Surface && classification == Classification::Before;
+        let is_between = compositing.has_surface() && classification == Classification::Before;
         // An open start has no slab before it.
         let lead = i32::from(is_between && !self.slabs.is_empty() && self.slabs.start != Self::ALL_SLABS.start);
         Self { slabs: self.slabs.start - lead..self.slabs.end, region: self.region }

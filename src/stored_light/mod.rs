@@ -13,3 +13,4 @@ mod file;
 mod stored;
 
 pub use stored::StoredLight;
+pub(crate) use stored::explicit;

@@ -30,8 +30,7 @@ impl StoredLight {
     /// If the scene has neither `shading.occlusion` nor `shading.shadow`, nothing in it keeps light off, the volume cannot be read, or sheets would take more
     /// than 4 GiB.
     pub fn of(volume: &OpenVolume, scene: &Scene) -> Result<Self, RenderError> {
-        scene.check()?;
-        let explicit = scene.explicit(volume.sample());
+        let explicit = explicit(volume, scene)?;
         let transfer = explicit.resolve(volume.sample());
         let lights = match volume {
             OpenVolume::Whole(volume) => {
@@ -84,8 +83,7 @@ impl StoredLight {
     /// # Errors
     /// If these are not its sheets.
     pub(crate) fn lights(&self, volume: &OpenVolume, scene: &Scene) -> Result<Arc<Lights>, RenderError> {
-        scene.check()?;
-        let explicit = scene.explicit(volume.sample());
+        let explicit = explicit(volume, scene)?;
         self.check(&explicit)?;
         let wanted = matter(volume, &explicit)?;
         if wanted != self.matter {
@@ -101,6 +99,15 @@ impl StoredLight {
         let shading = &explicit.shading;
         Ok(Arc::new(Lights { occlusion: stack(0, shading.occlusion), shadow: stack(1, shading.shadow) }))
     }
+}
+
+/// A scene of a volume with everything stated.
+///
+/// # Errors
+/// If a setting is invalid.
+pub(crate) fn explicit(volume: &OpenVolume, scene: &Scene) -> Result<Scene, SettingError> {
+    scene.check()?;
+    Ok(scene.explicit(volume.sample()))
 }
 
 /// The fingerprint of what keeps light off in a scene with everything stated.

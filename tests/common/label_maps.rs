@@ -49,12 +49,12 @@ pub(crate) fn segmented(random: &mut Random) -> Volume {
 pub(crate) fn scene_of_labels(random: &mut Random) -> Scene {
     let mut scene = scene(61, 47);
     let opacity = random.pick(&[0.3, 0.9, 1.0]);
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(0.0, [0.2, 0.4, 0.9]), (1.0, [0.9, 0.6, 0.4]), (3.0, [0.3, 0.9, 0.5]), (4.0, [1.0; 3])],
         &[(0.0, 0.0), (1.0, opacity)],
     );
     if random.bits().is_multiple_of(3) {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (0.1, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (0.1, 1.0)]).unwrap());
     }
     scene.camera.direction = random.direction();
     scene.shading.gradient = Gradient::Membership;

@@ -10,7 +10,7 @@ use sheetsplat::settings::{
     Camera, Classification, Clip, Compositing, FootprintBox, Gradient, Interpolation, LabelTables, Light, Method,
     Order, Projection, Ramp, Shading, SlabProfile, Splatting,
 };
-use sheetsplat::volume::{Grid, Labels, SampleType, Volume};
+use sheetsplat::volume::{Channels, Grid, Labels, SampleType, Volume};
 
 use super::{COMPOSITINGS, Random};
 
@@ -237,22 +237,13 @@ fn scene(style: u64, random: &mut Random, volume: &Volume, mut splatting: Splatt
     if volume.labels().is_some() {
         transfers[0].labels = label_tables(random, volume, splatting.compositing);
     }
-    let first = transfers.remove(0);
-    let further = transfers.into_iter().map(|transfer| {
+    let channels = transfers.into_iter().map(|transfer| {
         let mut channel = Channel::new(VolumeSource::Memory);
         channel.transfer = transfer;
         channel
     });
-    Scene {
-        image,
-        camera,
-        clip,
-        shading,
-        splatting,
-        transfer: first,
-        further: further.collect(),
-        ..Scene::new(VolumeSource::Memory)
-    }
+    let channels = Channels::of(channels).unwrap();
+    Scene { channels, image, camera, clip, shading, splatting, ..Scene::new(VolumeSource::Memory) }
 }
 
 /// An orthographic camera close by or far off, or an eye far off, near, or within the volume.

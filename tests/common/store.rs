@@ -6,7 +6,8 @@ use std::sync::{Arc, Mutex};
 
 use glam::UVec3;
 use sheetsplat::volume::{
-    Encoding, SampleType, Store, StoreFacts, StoreLevel, StreamedLevel, StreamedVolume, Texel, Volume, VolumeError,
+    Encoding, SampleType, Store, StoreFacts, StoreLevel, StreamedChannel, StreamedLevel, StreamedVolume, Texel, Volume,
+    VolumeError,
 };
 
 /// A volume in memory as a store that notes what is read of it.
@@ -130,6 +131,6 @@ impl Store for MemoryStore {
 
 /// A level of a store of one channel, to be streamed with a sample.
 pub(crate) fn streamed(store: Arc<dyn Store>, level: usize, sample: &Volume, memory: u64) -> StreamedVolume {
-    let first = StreamedLevel::new("store", store, level).into();
-    StreamedVolume { first, further: Vec::new(), sample: Arc::new(sample.clone()), memory }
+    let channels = StreamedChannel::from(StreamedLevel::new("store", store, level)).into();
+    StreamedVolume { channels, sample: Arc::new(sample.clone()), memory }
 }

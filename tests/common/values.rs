@@ -18,7 +18,7 @@ pub(crate) fn cases() -> Vec<(Volume, usize, Scene)> {
         let mut scene = scene(96, 80);
         scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
         scene.splatting.culling = false;
-        scene.transfer = transfer(
+        scene.channels[0].transfer = transfer(
             &[(at(40.0), [0.9, 0.6, 0.4]), (at(220.0), [1.0, 1.0, 0.9])],
             &[(at(30.0), 0.0), (at(80.0), 0.15), (at(200.0), 0.9)],
         );

@@ -20,8 +20,9 @@ fn head() -> Image {
     let volume = builtin::volume("head:32").unwrap();
     let mut scene = scene(96, 80);
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
-    reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap()
+    scene.channels[0].transfer =
+        transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
+    reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap()
 }
 
 fn filled(value: f32) -> Image {

@@ -97,15 +97,15 @@ fn frames_are_the_twins() {
                     ..LabelTables::default()
                 };
                 scene.shading.gradient = Gradient::Differences;
-                scene.transfer.labels = [(1, own(true)), (2, own(true)), (3, own(false))].into();
+                scene.channels[0].transfer.labels = [(1, own(true)), (2, own(true)), (3, own(false))].into();
                 segmented(&mut random)
             }
             _ => {
                 let first = label_map(&mut random);
                 let scan: Vec<f32> = first.values().iter().map(|_| random.uniform(0.0, 3.0) as f32).collect();
                 let scan = Volume::new("scan", first.dims(), first.spacing(), scan).unwrap();
-                scene.further.push(sheetsplat::scene::Channel::new(sheetsplat::scene::VolumeSource::Memory));
-                scene.further[0].transfer = scene.transfer.clone();
+                scene.channels.push(sheetsplat::scene::Channel::new(sheetsplat::scene::VolumeSource::Memory));
+                scene.channels[1].transfer = scene.channels[0].transfer.clone();
                 first.with_channels("channels", vec![scan]).unwrap()
             }
         };
@@ -118,7 +118,7 @@ fn frames_are_the_twins() {
         // Without it the picture is another.
         let mut plain = scene.clone();
         plain.shading.gradient = Gradient::Differences;
-        plain.transfer.labels.values_mut().for_each(|own| own.membership = false);
+        plain.channels[0].transfer.labels.values_mut().for_each(|own| own.membership = false);
         others += usize::from(psnr(&draw(&volume, &plain).image, &expected) < 50.0);
     }
     assert!(others > 12, "{others} pictures differ from those by differences");
@@ -151,15 +151,15 @@ fn label_maps_have_them_by_default() {
         ..own.clone()
     };
     assert_eq!(bits(&draw(&volume, &own).image), bits(&draw(&volume, &stated).image));
-    assert!(own.resolve(&volume).membership);
+    assert!(own.resolve(&volume)[0].membership);
     assert_eq!(own.explicit(&volume).shading.gradient, Gradient::Membership);
     own.splatting.classification = Classification::After;
-    assert!(!own.resolve(&volume).membership);
+    assert!(!own.resolve(&volume)[0].membership);
     assert_eq!(own.explicit(&volume).shading.gradient, Gradient::Differences);
 
     let head = builtin::volume("head:24").unwrap();
     let open = scene(40, 40);
-    assert!(!open.resolve(&head).membership);
+    assert!(!open.resolve(&head)[0].membership);
     assert_eq!(open.explicit(&head).shading.gradient, Gradient::Differences);
 }
 
@@ -175,7 +175,7 @@ fn masks_are_label_maps_by_their_preset() {
     let scene =
         Scene::from_volume(memory(), &["preset=labels", "image.width=40", "image.height=40"].map(str::to_owned));
     let scene = scene.unwrap();
-    assert!(scene.resolve(&mask).membership);
+    assert!(scene.resolve(&mask)[0].membership);
     let picture = bits(&draw(&mask, &scene).image);
     let explicit = scene.explicit(&mask);
     assert_eq!(bits(&draw(&mask, &explicit).image), picture, "everything stated");

@@ -50,7 +50,7 @@ fn projections_are_dark_on_a_light_background() {
         let sets = [format!("preset={preset}"), format!("image.background={background}"), colors.to_owned()];
         let sets: Vec<String> = sets.into_iter().filter(|set| !set.is_empty()).collect();
         let scene = Scene::from_volume(VolumeSource::Builtin("head:16".to_owned()), &sets).unwrap();
-        let color = scene.resolve(&scene.load_volume().unwrap()).color;
+        let color = scene.resolve(&scene.load_volume().unwrap())[0].color.clone();
         let dark = color.points().iter().all(|(_, rgb)| *rgb == DVec3::ZERO);
         assert_eq!(dark, is_dark, "{preset} on {background}: {color:?}");
     }
@@ -65,7 +65,6 @@ fn alpha() {
         iso_ranges: None,
         membership: false,
         labels: BTreeMap::new(),
-        further: Vec::new(),
     };
     assert_eq!((transfer.alpha(5.0, 0.0), transfer.alpha(20.0, 0.0)), (0.5, 1.0));
     transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (4.0, 1.0)]).unwrap());
@@ -239,7 +238,7 @@ fn shared_volumes_have_surfaces() {
 
 fn settings(table: &str) -> TransferSettings {
     let text = format!("[volume]\npath = 'a.nrrd'\n[transfer]\n{table}\n");
-    Scene::parse(&text, "scene.toml", Path::new("folder"), &[]).unwrap().transfer
+    Scene::parse(&text, "scene.toml", Path::new("folder"), &[]).unwrap().channels[0].transfer.clone()
 }
 
 #[test]

@@ -18,7 +18,7 @@ use crate::common::{BY_AMOUNTS, F32, Random, camera, scene, transfer};
 const METHODS: [Method; 3] = [Method::ImageAligned, Method::AxisAligned, Method::CompositeEverySample];
 
 fn render(volume: &Volume, scene: &Scene) -> Image {
-    reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+    reference::render(volume, &[scene.channels[0].transfer.resolve(volume)], scene).unwrap()
 }
 
 fn perspective(direction: [f64; 3], fov_y: f64, distance: f64, near: Option<f64>) -> Camera {
@@ -35,7 +35,8 @@ fn errors(a: &Image, b: &Image) -> Vec<f64> {
 /// A small head, semi-transparent.
 fn head() -> (Volume, Scene) {
     let mut scene = scene(72, 60);
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
+    scene.channels[0].transfer =
+        transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
     (builtin::volume("head:32").unwrap(), scene)
 }
 
@@ -86,7 +87,7 @@ fn a_blocks_opacity_is_that_of_its_thickness() {
             let mut scene = scene(1, 1);
             scene.camera = perspective(direction, 1.0, distance, None);
             scene.image.background = [0.0; 4];
-            scene.transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(0.0, 0.1)]);
+            scene.channels[0].transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(0.0, 0.1)]);
             (scene.splatting.radius, scene.splatting.falloff) = (4.0, 1.0);
             scene.splatting.compositing = Compositing::Exponential;
             let length = f64::from(LAYERS) * spacing.y / volume.grid().unit() / scene.camera.basis().w.y;
@@ -115,7 +116,7 @@ fn a_headlight_shines_from_the_eye() {
     let volume = Volume::new("wall", dims, DVec3::ONE, values).unwrap();
     let mut scene = scene(33, 33);
     scene.camera = perspective([0.0, 1.0, 0.0], 60.0, 40.0, None);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.9)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.9)]);
     (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
     scene.splatting.compositing = Compositing::Exponential;
     let image = render(&volume, &scene);
@@ -139,7 +140,7 @@ fn minified_kernels_keep_their_amount() {
             let mut scene = scene(size, size);
             scene.camera = perspective(direction, 90.0, 20.0, None);
             scene.image.background = [0.0; 4];
-            scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.02)]);
+            scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.02)]);
             // The kernels are so wide that the positions of pixel centres do not matter.
             (scene.splatting.radius, scene.splatting.falloff) = (4.0, 1.0);
             scene.splatting.method = method;
@@ -169,7 +170,8 @@ fn axis_aligned_equals_image_aligned_along_an_axis() {
             if direction[2] == 0.0 {
                 scene.camera.up = DVec3::Z;
             }
-            scene.transfer = transfer(&[(0.0, [0.2, 0.3, 1.0]), (100.0, [1.0, 0.8, 0.2])], &[(0.0, 0.0), (100.0, 0.2)]);
+            scene.channels[0].transfer =
+                transfer(&[(0.0, [0.2, 0.3, 1.0]), (100.0, [1.0, 0.8, 0.2])], &[(0.0, 0.0), (100.0, 0.2)]);
             scene.image.background = [0.0; 4];
             scene.splatting.compositing = Compositing::Exponential;
             let image_aligned = render(&volume, &scene);
@@ -197,7 +199,7 @@ fn slices_are_ordered_along_w() {
             let mut scene = scene(9, 9);
             scene.camera = camera([x, 0.3, 0.2], 4.0);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-            scene.transfer = transfer(&[(3.0, [1.0, 0.0, 0.0]), (8.0, [0.0, 0.0, 1.0])], &[(0.0, 0.7)]);
+            scene.channels[0].transfer = transfer(&[(3.0, [1.0, 0.0, 0.0]), (8.0, [0.0, 0.0, 1.0])], &[(0.0, 0.7)]);
             scene.shading.enabled = false;
             scene.splatting.method = method;
             let [red, _, blue, _] = render(&volume, &scene).pixels[40];
@@ -244,7 +246,7 @@ fn every_sample_is_composited_by_itself() {
     scene.camera = camera([0.0, 1.0, 0.0], 1e-3);
     scene.image.background = [0.0; 4];
     scene.shading.enabled = false;
-    scene.transfer = transfer(&[(1.0, [1.0, 0.0, 0.0]), (2.0, [0.0, 0.0, 1.0])], &[(0.0, 0.8)]);
+    scene.channels[0].transfer = transfer(&[(1.0, [1.0, 0.0, 0.0]), (2.0, [0.0, 0.0, 1.0])], &[(0.0, 0.8)]);
     scene.splatting.method = Method::CompositeEverySample;
     let kernel = Kernel::new(2.0, 2.0);
     let amount = 0.8 * kernel.section(0.0, -2.0, 2.0);
@@ -271,7 +273,7 @@ fn culling_in_perspective_and_by_slices() {
             let mut scene = scene(100, 90);
             scene.camera = Camera { projection, ..camera([0.55, 0.8, -0.3], 1.0) };
             scene.splatting.method = method;
-            let transfer = scene.transfer.resolve(&volume);
+            let transfer = [scene.channels[0].transfer.resolve(&volume)];
             let render = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap();
             let [all, culled] = [None, Some(Test::Box)].map(render);
             let difference = largest_difference(&all.image, &culled.image);
@@ -299,7 +301,7 @@ fn the_near_plane_cuts_kernels() {
             let mut scene = scene(1, 1);
             scene.camera = perspective([0.0, 1.0, 0.0], 1e-3, 10.0, Some(10.0 - before));
             scene.image.background = [0.0; 4];
-            scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.3)]);
+            scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.3)]);
             scene.splatting.compositing = Compositing::Xray;
             scene.splatting.method = method;
             let stretch = spacing[1];
@@ -307,7 +309,7 @@ fn the_near_plane_cuts_kernels() {
             let alpha = f64::from(render(&volume, &scene).pixels[0][3]);
             let what = format_args!("{spacing:?} {method:?} near {before} before: {alpha}");
             assert_at_most((alpha - 0.3 * part).abs(), 0.5 * F32, what);
-            let counts = reference::count(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+            let counts = reference::count(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
             assert_eq!(counts.voxels_in_range, u64::from(before > 0.0));
             if method == Method::ImageAligned {
                 // Slabs of width 1 start at the eye; the voxel is at 10.
@@ -333,7 +335,7 @@ fn every_view_is_finite() {
         scene.camera.center = Some(random.direction() * 10.0);
         scene.splatting.method = METHODS[case % 3];
         scene.splatting.compositing = BY_AMOUNTS[case / 3 % 3];
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = [scene.channels[0].transfer.resolve(&volume)];
         let culled = reference::render_culled(&volume, &transfer, &scene, Some(Test::Box)).unwrap();
         let valid = |channel: &f32| (0.0..=1.000_001).contains(channel);
         assert!(culled.image.pixels.as_flattened().iter().all(valid), "{:?}", scene.camera);

@@ -64,14 +64,14 @@ fn psnr_against_the_reference() {
     let mut scene = scene(96, 80);
     // The reference culls nothing; `tests/gpu/culling.rs` tests what culling may change.
     scene.splatting.culling = false;
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(40.0, [0.9, 0.6, 0.4]), (120.0, [0.8, 0.3, 0.2]), (220.0, [1.0, 1.0, 0.9])],
         &[(30.0, 0.0), (80.0, 0.15), (130.0, 0.1), (200.0, 0.9)],
     );
     let mut worst = [[[Worst::NONE; SPACINGS.len()]; COMPOSITINGS.len()]; VARIANTS.len()];
     for (s, spacing) in SPACINGS.into_iter().enumerate() {
         let volume = head.clone().with_spacing("head", DVec3::from(spacing)).unwrap();
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = scene.channels[0].transfer.resolve(&volume);
         for (c, compositing) in COMPOSITINGS.into_iter().enumerate() {
             for (direction, radius, slab_width) in DIRECTIONS.into_iter().flat_map(|direction| {
                 RADII.into_iter().flat_map(move |radius| SLAB_WIDTHS.map(|width| (direction, radius, width)))
@@ -81,7 +81,7 @@ fn psnr_against_the_reference() {
                 (scene.splatting.radius, scene.splatting.slab_width) = (radius, slab_width);
                 scene.splatting.compositing = compositing;
                 scene.splatting.footprint = FootprintForm::SummedArea;
-                let expected = reference::render(&volume, &transfer, &scene).unwrap();
+                let expected = reference::render(&volume, std::slice::from_ref(&transfer), &scene).unwrap();
                 let background = scene.image.background.map(|channel| channel as f32);
                 for (v, (_, rasterizer, footprint, ..)) in VARIANTS.into_iter().enumerate() {
                     (scene.splatting.rasterizer, scene.splatting.footprint) = (rasterizer, footprint);

@@ -19,7 +19,7 @@ const SIZE: u32 = 256;
 /// Opacity 0.5 per unit, with only diffuse light on both faces.
 fn cube() -> (Volume, Scene) {
     let mut scene = scene(SIZE, SIZE);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
     (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
     (builtin::volume("cube").unwrap(), scene)
 }
@@ -64,8 +64,9 @@ fn the_cube_does_not_pop() {
         let gpu = &gpu;
         move |volume: &Volume, scene: &Scene| drawing.render(gpu, volume, scene).image
     };
-    let twin =
-        |volume: &Volume, scene: &Scene| reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap();
+    let twin = |volume: &Volume, scene: &Scene| {
+        reference::render(volume, &[scene.channels[0].transfer.resolve(volume)], scene).unwrap()
+    };
     // The faces are turned 44.8° and 45.2° from the light.
     let cosines = 44.8_f64.to_radians().cos() / 45.2_f64.to_radians().cos();
     let (volume, mut scene) = cube();
@@ -95,7 +96,7 @@ fn the_cube_does_not_pop() {
         assert!(1.0027 < ratio && ratio < cosines, "{name}: {ratio}");
     }
     // A lit layer that hides everything behind it.
-    scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (255.0, 1.0)]).unwrap());
+    scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (255.0, 1.0)]).unwrap());
     for (name, Turned { ratio, .. }) in by_all(&scene) {
         assert_at_most((ratio / cosines - 1.0).abs(), 0.0006, name);
     }

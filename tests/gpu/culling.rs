@@ -48,7 +48,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     }
     let (haze, solid) = (random.pick(&[0.0, 0.01, 0.2]), random.pick(&[0.3, 0.9, 1.0]));
     let opacity = [(5.0, 0.0), (20.0, haze), (200.0, solid)];
-    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 1.0, 1.0])], &opacity);
+    scene.channels[0].transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 1.0, 1.0])], &opacity);
     scene.splatting.method = random.pick(&[Method::ImageAligned, Method::ImageAligned, Method::AxisAligned]);
     scene.splatting.compositing = random.pick(&[Compositing::Linear, Compositing::Exponential]);
     scene.splatting.opacity_threshold = random.pick(&[0.5, 0.8, 0.95, 0.999, 1.0]);
@@ -175,12 +175,14 @@ fn culling_is_nearly_exact() {
     let headless = headless(None);
     let volume = builtin::volume("head:96").unwrap();
     let mut scene = Scene { camera: camera([0.55, 0.8, -0.12], 172.0), ..scene(192, 192) };
-    let transfer = scene.transfer.resolve(&volume);
+    let transfer = scene.channels[0].transfer.resolve(&volume);
     let eye = Projection::Perspective { fov_y: 30.0, distance: None, near: None };
     for projection in [scene.camera.projection, eye] {
         for method in [Method::ImageAligned, Method::AxisAligned] {
             (scene.camera.projection, scene.splatting.method) = (projection, method);
-            let exact = reference::render_culled(&volume, &transfer, &scene, Some(Test::Box)).unwrap().sections;
+            let exact = reference::render_culled(&volume, std::slice::from_ref(&transfer), &scene, Some(Test::Box))
+                .unwrap()
+                .sections;
             for drawing in DRAWINGS {
                 let counts = drawing.render(&headless, &volume, &scene).stats.counts;
                 let (drawn, all) = (counts.sections_rasterized, counts.sections_total);
@@ -231,8 +233,8 @@ fn the_papers_simpler_tests() {
     scene.camera = Camera::default();
     (scene.image.width, scene.image.height) = (96, 96);
     scene.camera.projection = Projection::Orthographic { height: Some(172.0) };
-    let transfer = scene.transfer.resolve(&volume);
-    let image = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap().image;
+    let transfer = scene.channels[0].transfer.resolve(&volume);
+    let image = |test| reference::render_culled(&volume, std::slice::from_ref(&transfer), &scene, test).unwrap().image;
     let all = image(None);
     let allowed = 1.0 - scene.splatting.opacity_threshold;
     assert_at_most(largest_difference(&all, &image(Some(Test::Box))), allowed, "by the box");
@@ -259,8 +261,8 @@ fn what_the_rectangle_costs() {
         scene.camera.direction = DVec3::from(direction);
         scene.camera.up = DVec3::new(0.3, 0.1, 1.0);
         (scene.image.width, scene.image.height) = (120, 120);
-        let transfer = scene.transfer.resolve(&volume);
-        let render = |test| reference::render_culled(&volume, &transfer, &scene, test).unwrap();
+        let transfer = scene.channels[0].transfer.resolve(&volume);
+        let render = |test| reference::render_culled(&volume, std::slice::from_ref(&transfer), &scene, test).unwrap();
         let [all, rectangle, parallelogram] = [None, Some(Test::Box), Some(Test::Parallelogram)].map(render);
         let allowed = 1.0 - scene.splatting.opacity_threshold;
         assert_at_most(largest_difference(&all.image, &rectangle.image), allowed, format_args!("{spacing:?}"));
@@ -290,9 +292,11 @@ fn tiles_and_the_bounding_box() {
         scene.camera.direction = DVec3::Y;
         scene.camera.projection = Projection::Orthographic { height: Some(100.0) };
         (scene.image.width, scene.image.height) = (200, 200);
-        scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (1.0, 0.5)]).unwrap());
+        scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (1.0, 0.5)]).unwrap());
         let volume = volume(voxels);
-        reference::render_culled(&volume, &scene.transfer.resolve(&volume), &scene, Some(Test::Box)).unwrap().areas
+        reference::render_culled(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene, Some(Test::Box))
+            .unwrap()
+            .areas
     };
     // At two pixels per voxel the footprint reaches 4 pixels from its centre. It lies in the middle of a tile, in four slabs.
     let inside = UVec3::new(8, 1, 91);

@@ -38,7 +38,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     }
     let (haze, solid) = (random.pick(&[0.0, 0.02, 0.2]), random.pick(&[0.3, 0.9, 1.0]));
     let opacity = [(5.0, 0.0), (20.0, haze), (200.0, solid)];
-    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
+    scene.channels[0].transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
     scene.splatting.compositing = random.pick(&[Compositing::Linear, Compositing::Exponential, Compositing::Xray]);
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0]);
     scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
@@ -130,8 +130,8 @@ fn cuts_equal_the_reference() {
             Order::FrontToBack
         };
         let unit = volume.grid().unit();
-        let transfer = scene.transfer.resolve(&volume);
-        let whole = reference::render(&volume, &transfer, &scene).unwrap();
+        let transfer = scene.channels[0].transfer.resolve(&volume);
+        let whole = reference::render(&volume, std::slice::from_ref(&transfer), &scene).unwrap();
         if case % 3 != 0 {
             scene.clip = random_clip(&mut random, volume.grid());
         }
@@ -139,7 +139,7 @@ fn cuts_equal_the_reference() {
         let depths = (case % 3 != 1).then(|| random_surface(&mut random, &view, unit));
         let first_hit = (scene.splatting.order == Order::FrontToBack).then(|| random.pick(&[0.05, 0.5, 0.9]));
         let host = Host { surfaces: depths.as_deref(), first_hit };
-        let expected = reference::render_for(host, &volume, &transfer, &scene, None).unwrap();
+        let expected = reference::render_for(host, &volume, std::slice::from_ref(&transfer), &scene, None).unwrap();
         changed += usize::from(largest_difference(&whole, &expected.image) > 0.1);
         let range = random.pick(&[DepthRange::Standard, DepthRange::Reversed, DepthRange::Infinite]);
         for (drawing, worst) in DRAWINGS.into_iter().zip(&mut worst) {
@@ -264,7 +264,7 @@ fn cuts_are_exact_along_rays() {
     let gpu = gpu();
     let volume = builtin::volume("tomato:40").unwrap();
     let mut scene = scene(120, 100);
-    scene.transfer =
+    scene.channels[0].transfer =
         transfer(&[(40.0, [0.9, 0.2, 0.1]), (220.0, [0.9, 1.0, 0.6])], &[(30.0, 0.0), (90.0, 0.1), (200.0, 0.5)]);
     scene.splatting.compositing = Compositing::Exponential;
     scene.splatting.culling = false;
@@ -282,11 +282,11 @@ fn cuts_are_exact_along_rays() {
         scene.camera.projection = projection;
         scene.clip.planes = vec![[normal[0], normal[1], normal[2], d]];
         scene.clip.crop = Some([-half * DVec3::new(2.0, 2.0, 0.5), half * 2.0]);
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = scene.channels[0].transfer.resolve(&volume);
         let pixels: Vec<UVec2> = (0..12_000).step_by(7).map(|at| UVec2::new(at % 120, at / 120)).collect();
         let whole = Scene { clip: Clip::default(), ..scene.clone() };
-        let [marched, marched_whole] =
-            [&scene, &whole].map(|scene| ray_march::pixels(&volume, &transfer, scene, &pixels).unwrap());
+        let [marched, marched_whole] = [&scene, &whole]
+            .map(|scene| ray_march::pixels(&volume, std::slice::from_ref(&transfer), scene, &pixels).unwrap());
         for drawing in [Drawing::By(Rasterizer::Tiles), Drawing::Native] {
             let [decibels, unclipped] = [(&scene, &marched), (&whole, &marched_whole)].map(|(scene, marched)| {
                 let image = drawing.render(gpu, &volume, scene).image;
@@ -346,7 +346,7 @@ fn picks() {
     }
     let volume = Volume::new("plate", grid.dims, grid.spacing, values).unwrap();
     let mut scene = scene(21, 21);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(50.0, 0.0), (100.0, 1.0)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(50.0, 0.0), (100.0, 1.0)]);
     let projections = [
         (Projection::Orthographic { height: Some(21.0) }, 4.0),
         (Projection::Perspective { fov_y: 90.0, distance: Some(6.5), near: None }, 10.5),

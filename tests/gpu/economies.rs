@@ -24,7 +24,7 @@ fn cases() -> Vec<(&'static str, Volume, Scene)> {
     let values = (0..17 * 20 * 15).map(|_| random.uniform(0.0, 200.0) as f32).collect();
     let noise = Volume::new("noise", UVec3::new(17, 20, 15), DVec3::new(1.0, 1.0, 3.0), values).unwrap();
     let mut scene = Scene { camera: camera([0.3, 0.9, -0.4], 42.0), ..scene(90, 75) };
-    scene.transfer =
+    scene.channels[0].transfer =
         transfer(&[(0.0, [0.2, 0.4, 1.0]), (200.0, [1.0, 0.8, 0.3])], &[(10.0, 0.0), (60.0, 0.05), (200.0, 0.9)]);
     scene.splatting.culling = false;
     let tomato = builtin::volume("tomato:40").unwrap();
@@ -38,7 +38,7 @@ fn render(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> Rendering {
 }
 
 fn twin(volume: &Volume, scene: &Scene) -> Image {
-    reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+    reference::render(volume, &[scene.channels[0].transfer.resolve(volume)], scene).unwrap()
 }
 
 fn decibels(a: &Image, b: &Image) -> f64 {

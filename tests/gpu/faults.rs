@@ -17,7 +17,7 @@ use crate::common::{RASTERIZERS, scene, transfer};
 
 fn head() -> (Volume, Scene) {
     let mut scene = scene(60, 50);
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4])], &[(30.0, 0.0), (120.0, 0.3)]);
+    scene.channels[0].transfer = transfer(&[(40.0, [0.9, 0.6, 0.4])], &[(30.0, 0.0), (120.0, 0.3)]);
     (builtin::volume("head:16").unwrap(), scene)
 }
 

@@ -41,7 +41,7 @@ fn volumes(random: &mut Random, spacing: [f64; 3]) -> [(&'static str, Volume); 4
 /// All voxels that take part are visible, shaded, and modulated by their gradients.
 fn translucent(camera: Camera) -> Scene {
     let mut scene = Scene { camera, ..scene(61, 47) };
-    scene.transfer = TransferSettings {
+    scene.channels[0].transfer = TransferSettings {
         gradient_opacity: Some(Ramp::new(vec![(0.0, 0.3), (20.0, 0.6), (80.0, 1.0)]).unwrap()),
         ..transfer(&[(0.0, [0.1, 0.3, 0.9]), (200.0, [1.0, 0.8, 0.6])], &[(0.0, 0.02), (250.0, 0.5)])
     };
@@ -150,7 +150,8 @@ fn frames_equal_the_reference() {
             ] {
                 let mut scene = translucent(camera);
                 (scene.splatting.compositing, scene.splatting.method) = (compositing, method);
-                let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+                let expected =
+                    reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
                 let by_gpu = match method {
                     Method::CompositeEverySample => vec![(2, Drawing::By(Rasterizer::Auto), 90.0)],
                     _ => {
@@ -190,14 +191,14 @@ fn a_hole_is_a_hidden_voxel() {
             let mut scene = translucent(camera);
             (scene.splatting.culling, scene.splatting.compositing) = (true, compositing);
             // The voxels are opaque enough for surfaces.
-            scene.transfer =
+            scene.channels[0].transfer =
                 transfer(&[(0.0, [0.1, 0.3, 0.9]), (200.0, [1.0, 0.8, 0.6])], &[(0.0, 0.02), (250.0, 0.9)]);
             scene.shading.enabled = false;
             let mut hidden = scene.clone();
-            hidden.transfer.labels.insert(1, LabelTables { visible: false, ..LabelTables::default() });
+            hidden.channels[0].transfer.labels.insert(1, LabelTables { visible: false, ..LabelTables::default() });
             let what = format!("{name}, {compositing:?}");
             let twin = |volume: &Volume, scene: &Scene| {
-                reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+                reference::render(volume, &[scene.channels[0].transfer.resolve(volume)], scene).unwrap()
             };
             assert_finite(&twin(&volume, &scene), &what);
             assert!(twin(&volume, &scene) == twin(&filled, &hidden), "{what}: the twin");
@@ -231,7 +232,7 @@ fn lists_leave_holes_out() {
         view.set_iso_ranges(iso_ranges.clone()).unwrap();
         let drawn = gpu.draw(&mut view).unwrap();
         assert_eq!(drawn.stats.counts.voxels_in_range, expected, "{iso_ranges:?}");
-        let fresh = Scene { transfer: TransferSettings { iso_ranges, ..scene.transfer.clone() }, ..scene.clone() };
+        let fresh = scene.clone().with_transfer(TransferSettings { iso_ranges, ..scene.channels[0].transfer.clone() });
         assert!(drawn.image == gpu.render_volume(volume.clone(), &fresh).unwrap().image);
     }
     let list = view.volume().value_list();

@@ -209,14 +209,14 @@ fn tables(labels: &[u16]) -> impl Iterator<Item = (u64, LabelTables)> {
 
 /// Draws a scene by everything that draws it, with and without culling, and compares with the f64 evaluation.
 fn check(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) {
-    let transfer = scene.transfer.resolve(volume);
+    let transfer = scene.channels[0].transfer.resolve(volume);
     let mut scene = scene.clone();
     scene.splatting.culling = false;
     let scene = &scene;
-    let expected = reference::render(volume, &transfer, scene).unwrap();
-    let counts = reference::count(volume, &transfer, scene).unwrap();
+    let expected = reference::render(volume, std::slice::from_ref(&transfer), scene).unwrap();
+    let counts = reference::count(volume, std::slice::from_ref(&transfer), scene).unwrap();
     let plain = TransferFunction { labels: BTreeMap::new(), ..transfer };
-    let plain = reference::render(volume, &plain, scene).unwrap();
+    let plain = reference::render(volume, std::slice::from_ref(&plain), scene).unwrap();
     assert_at_least(largest_difference(&plain, &expected), 0.1, format_args!("{name}: without labels"));
     for drawing in DRAWINGS {
         let mut scene = scene.clone();
@@ -247,17 +247,17 @@ fn frames_of_labels_equal_the_reference() {
             let volume = segmented(&labels, spacing);
             let mut scene = scene(61, 53);
             scene.camera = camera([0.5, 0.7, -0.4], 36.0);
-            scene.transfer = transfer(
+            scene.channels[0].transfer = transfer(
                 &[(20.0, [0.9, 0.8, 0.3]), (250.0, [1.0, 1.0, 1.0])],
                 &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)],
             );
-            scene.transfer.labels = tables(&labels).collect();
+            scene.channels[0].transfer.labels = tables(&labels).collect();
             scene.splatting.compositing = compositing;
             scene.splatting.order = order;
             check(gpu, &format!("{labels:?} {spacing:?} {compositing:?}"), &volume, &scene);
             // Labels without gradient opacity use the main table's; iso-ranges apply to all.
-            scene.transfer.gradient_opacity = ramp(&[(5.0, 0.2), (40.0, 1.0)]);
-            scene.transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 230.0]]);
+            scene.channels[0].transfer.gradient_opacity = ramp(&[(5.0, 0.2), (40.0, 1.0)]);
+            scene.channels[0].transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 230.0]]);
             check(gpu, &format!("{labels:?} {spacing:?} {compositing:?}, all tables"), &volume, &scene);
         }
     }
@@ -271,8 +271,8 @@ fn labels_in_perspective_equal_the_reference() {
     let mut scene = scene(61, 53);
     scene.camera = camera([0.5, 0.7, -0.4], 36.0);
     scene.camera.projection = Projection::Perspective { fov_y: 40.0, distance: Some(45.0), near: None };
-    scene.transfer = transfer(&[(20.0, [0.9, 0.8, 0.3])], &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)]);
-    scene.transfer.labels = tables(&labels).collect();
+    scene.channels[0].transfer = transfer(&[(20.0, [0.9, 0.8, 0.3])], &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)]);
+    scene.channels[0].transfer.labels = tables(&labels).collect();
     scene.splatting.compositing = Compositing::Exponential;
     check(gpu, "perspective", &segmented(&labels, [1.0, 1.0, 1.6]), &scene);
 }
@@ -285,10 +285,10 @@ fn labels_of_every_sample_equal_the_reference() {
     let volume = segmented(&labels, [1.0, 1.0, 1.6]);
     let mut scene = scene(61, 53);
     scene.camera = camera([0.5, 0.7, -0.4], 36.0);
-    scene.transfer = transfer(&[(20.0, [0.9, 0.8, 0.3])], &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)]);
-    scene.transfer.labels = tables(&labels).collect();
+    scene.channels[0].transfer = transfer(&[(20.0, [0.9, 0.8, 0.3])], &[(10.0, 0.0), (100.0, 0.3), (200.0, 0.1)]);
+    scene.channels[0].transfer.labels = tables(&labels).collect();
     scene.splatting.method = Method::CompositeEverySample;
-    let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+    let expected = reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
     for drawing in [Drawing::By(Rasterizer::Quads), Drawing::Native] {
         let drawn = drawing.render(gpu, &volume, &scene);
         assert_at_most(largest_difference(&drawn.image, &expected), 2.5e-4, format!("every sample {drawing:?}"));
@@ -310,9 +310,9 @@ fn labels_in_several_layers() {
     let mut scene = scene(64, 48);
     scene.camera = camera([0.02, 0.5, -0.9], 30.0);
     scene.camera.center = Some(volume.grid().world_position(place));
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(100.0, 0.0), (150.0, 0.2)]);
-    scene.transfer.labels = tables(&[1, 2, 3]).collect();
-    scene.transfer.iso_ranges = Some(vec![[100.0, 300.0]]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(100.0, 0.0), (150.0, 0.2)]);
+    scene.channels[0].transfer.labels = tables(&[1, 2, 3]).collect();
+    scene.channels[0].transfer.iso_ranges = Some(vec![[100.0, 300.0]]);
     check(gpu, "several layers", &volume, &scene);
 }
 
@@ -322,17 +322,17 @@ fn hiding_a_label_needs_no_texture() {
     let gpu = gpu();
     let volume = Arc::new(segmented(&[3, 4], [1.0; 3]));
     let mut scene = scene(32, 32);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.5)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.5)]);
     let bytes = |scene: &Scene| {
         let mut view = gpu.view(volume.clone(), scene).unwrap();
         gpu.draw(&mut view).unwrap();
         view.volume().gpu_bytes()
     };
     let all = bytes(&scene);
-    scene.transfer.labels =
+    scene.channels[0].transfer.labels =
         [(3, LabelTables { visible: false, color: rgb([1.0; 3]), ..LabelTables::default() })].into();
     assert!(bytes(&scene) < all, "hiding half of the voxels needs more memory");
-    scene.transfer.labels.insert(4, LabelTables { color: rgb([1.0; 3]), ..LabelTables::default() });
+    scene.channels[0].transfer.labels.insert(4, LabelTables { color: rgb([1.0; 3]), ..LabelTables::default() });
     assert!(bytes(&scene) > all - 100, "labels take no memory");
 }
 
@@ -340,11 +340,11 @@ fn hiding_a_label_needs_no_texture() {
 fn tables_without_labels_are_an_error() {
     let gpu = gpu();
     let mut scene = scene(16, 16);
-    scene.transfer.labels = tables(&[1]).collect();
+    scene.channels[0].transfer.labels = tables(&[1]).collect();
     let error = gpu.render_volume(builtin::volume("cube:8").unwrap(), &scene).unwrap_err();
     assert!(matches!(&error, RenderError::OutOfRange(error) if error.key == "transfer.label"), "{error}");
     // A label that no voxel has is ignored, because one transfer function serves many volumes.
-    scene.transfer.labels = tables(&[77]).collect();
+    scene.channels[0].transfer.labels = tables(&[77]).collect();
     gpu.render_volume(builtin::volume("head:8").unwrap(), &scene).unwrap();
 }
 

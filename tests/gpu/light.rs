@@ -22,7 +22,7 @@ fn lit(classification: Classification) -> (Volume, Scene) {
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
     scene.splatting.culling = false;
     scene.splatting.classification = classification;
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(40.0, [0.9, 0.6, 0.4]), (120.0, [0.8, 0.3, 0.2]), (220.0, [1.0, 1.0, 0.9])],
         &[(30.0, 0.0), (80.0, 0.15), (130.0, 0.1), (200.0, 0.9)],
     );
@@ -54,7 +54,8 @@ fn frames_are_those_of_the_f64_evaluation() {
             "surface",
             Box::new(|_, scene| {
                 scene.splatting.compositing = Compositing::Surface;
-                scene.transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (80.0, 0.6), (200.0, 0.9)]).unwrap());
+                scene.channels[0].transfer.opacity =
+                    Some(Ramp::new(vec![(30.0, 0.0), (80.0, 0.6), (200.0, 0.9)]).unwrap());
             }),
         ),
         ("perspective", Box::new(move |_, scene| scene.camera.projection = perspective)),
@@ -80,7 +81,7 @@ fn frames_are_those_of_the_f64_evaluation() {
                 let mirrored = Volume::new("mirrored", volume.dims(), volume.spacing(), mirrored).unwrap();
                 let mut channel = Channel::new(VolumeSource::Memory);
                 channel.transfer = transfer(&[(0.0, [0.1, 0.9, 0.2])], &[(20.0, 0.0), (220.0, 0.8)]);
-                scene.further = vec![channel];
+                scene.channels.push(channel);
                 *volume = volume.clone().with_channels("two", vec![mirrored]).unwrap();
             }),
         ),
@@ -118,8 +119,8 @@ fn views_keep_light_only_while_it_holds() {
             view.set_camera(scene.camera).unwrap();
         });
         same(&|view, scene| {
-            scene.transfer.iso_ranges = Some(vec![[100.0, 300.0]]);
-            view.set_iso_ranges(scene.transfer.iso_ranges.clone()).unwrap();
+            scene.channels[0].transfer.iso_ranges = Some(vec![[100.0, 300.0]]);
+            view.set_iso_ranges(scene.channels[0].transfer.iso_ranges.clone()).unwrap();
         });
         same(&|view, scene| {
             scene.clip.planes = vec![[0.3, 1.0, -0.2, 2.0]];

@@ -36,7 +36,8 @@ fn open(limits: Limits, features: Features, sheet_format: Option<TextureFormat>)
 fn head() -> (Volume, Scene) {
     let mut scene = scene(150, 110);
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
+    scene.channels[0].transfer =
+        transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
     (builtin::volume("head:32").unwrap(), scene)
 }
 
@@ -119,7 +120,7 @@ fn attachments_limit_the_sheets_of_a_group() {
 fn small_bindings_split_voxels_and_image() {
     let (_, mut scene) = head();
     let volume = builtin::volume("head:64").unwrap();
-    let voxels = classify(&volume, &scene.transfer.resolve(&volume), &ClippedVoxels::default());
+    let voxels = classify(&volume, &[scene.channels[0].transfer.resolve(&volume)], &ClippedVoxels::default());
     let bricks = BrickList::new(volume.grid(), &voxels);
     let full = open(Limits::default(), Features::FLOAT32_BLENDABLE, None).unwrap();
     // 32 rows of 150 pixels are 75 KiB, so a band has one or two rows of tiles.

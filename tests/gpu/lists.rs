@@ -29,7 +29,7 @@ fn skin() -> TransferSettings {
 }
 
 fn head() -> (Arc<Volume>, Scene) {
-    let scene = Scene { camera: camera([0.5, 0.8, -0.2], 170.0), transfer: skin(), ..scene(90, 75) };
+    let scene = Scene { camera: camera([0.5, 0.8, -0.2], 170.0), ..scene(90, 75) }.with_transfer(skin());
     (Arc::new(builtin::volume("head:48").unwrap()), scene)
 }
 
@@ -46,7 +46,7 @@ fn taking_part(volume: &Volume, transfer: &TransferFunction) -> Vec<bool> {
 
 fn assert_fresh(gpu: &GpuHeadless, view: &mut SceneView, name: &str) {
     let drawn = gpu.draw(view).unwrap();
-    let scene = Scene { transfer: view.volume().transfer().clone().into(), ..view.scene().clone() };
+    let scene = view.scene().clone().with_transfer(view.volume().transfer()[0].clone());
     let fresh = gpu.render_volume(view.volume().volume().clone(), &scene).unwrap();
     assert!(drawn.image == fresh.image, "{name}: the image is not that of a fresh view");
     let counts = |rendering: &sheetsplat::headless::Rendering| {
@@ -72,14 +72,14 @@ fn assert_changes_are_fresh(gpu: &GpuHeadless, rasterizer: Rasterizer) {
     let (volume, mut scene) = head();
     scene.splatting.rasterizer = rasterizer;
     // Few voxels at first, so that the lists must grow later.
-    scene.transfer.iso_ranges = Some(vec![[200.0, 255.0]]);
+    scene.channels[0].transfer.iso_ranges = Some(vec![[200.0, 255.0]]);
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
     assert_fresh(gpu, &mut view, "first");
     let mut random = Random(8);
     let (mut entered, mut left, mut rebuilt) = (0, 0, 0);
     for step in 0..40 {
-        let before = taking_part(&volume, view.volume().transfer());
-        let old = view.volume().transfer().clone();
+        let before = taking_part(&volume, &view.volume().transfer()[0]);
+        let old = view.volume().transfer()[0].clone();
         let touched = match random.bits() % 4 {
             0 => {
                 let lo = random.uniform(-20.0, 200.0);
@@ -99,7 +99,7 @@ fn assert_changes_are_fresh(gpu: &GpuHeadless, rasterizer: Rasterizer) {
                 view.set_transfer_function(TransferFunction { gradient_opacity, ..old }).unwrap()
             }
         };
-        let after = taking_part(&volume, view.volume().transfer());
+        let after = taking_part(&volume, &view.volume().transfer()[0]);
         let count = |was: bool, is: bool| {
             before.iter().zip(&after).filter(|&(&before, &after)| (before, after) == (was, is)).count() as u64
         };
@@ -128,8 +128,8 @@ fn changed_labels_are_fresh_ones() {
         let mut random = Random(seed);
         let (mut entered, mut left) = (0, 0);
         for step in 0..30 {
-            let before = taking_part(&volume, view.volume().transfer());
-            let mut transfer = view.volume().transfer().clone();
+            let before = taking_part(&volume, &view.volume().transfer()[0]);
+            let mut transfer = view.volume().transfer()[0].clone();
             let label = (random.bits() % 8) as u16;
             let start = random.uniform(0.0, 150.0);
             let tables = transfer.labels.entry(label).or_default();
@@ -155,7 +155,7 @@ fn changed_labels_are_fresh_ones() {
                 }
                 _ => view.set_iso_ranges((start < 50.0).then(|| vec![[2.0 * start, 250.0]])).unwrap(),
             };
-            let after = taking_part(&volume, view.volume().transfer());
+            let after = taking_part(&volume, &view.volume().transfer()[0]);
             let count = |was: bool, is: bool| {
                 before.iter().zip(&after).filter(|&(&before, &after)| (before, after) == (was, is)).count() as u64
             };
@@ -179,7 +179,9 @@ fn a_change_of_a_label_touches_its_voxels() {
     let (volume, scene) = head();
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
     let of_label = |label: u16| {
-        let part = taking_part(&volume, &scene.transfer.resolve(&volume)).into_iter().zip(volume.labels().unwrap());
+        let part = taking_part(&volume, &scene.channels[0].transfer.resolve(&volume))
+            .into_iter()
+            .zip(volume.labels().unwrap());
         part.filter(|&(is_part, &of)| is_part && of == label).count() as u64
     };
     let prepare = |view: &mut SceneView| gpu.renderer().prepare(gpu.device(), gpu.queue(), view).unwrap().bucketed;
@@ -192,13 +194,13 @@ fn a_change_of_a_label_touches_its_voxels() {
     assert_eq!((touched.entered, touched.left), (of_label(4), 0));
     assert_fresh(gpu, &mut view, "grey matter shown");
     // Hidden by its opacity instead.
-    let mut transfer = view.volume().transfer().clone();
+    let mut transfer = view.volume().transfer()[0].clone();
     transfer.labels.entry(7).or_default().opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
     assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched { left: of_label(7), ..Touched::default() });
     assert_fresh(gpu, &mut view, "eyes without opacity");
     // Colours and opacities of a visible label: its voxels are only shaded again.
     for green in [0.2, 0.7] {
-        let mut transfer = view.volume().transfer().clone();
+        let mut transfer = view.volume().transfer()[0].clone();
         let tables = transfer.labels.entry(5).or_default();
         tables.color = Some(Ramp::new(vec![(0.0, DVec3::new(0.1, green, 0.1))]).unwrap());
         tables.opacity = Some(Ramp::new(vec![(60.0, 0.0), (140.0, green)]).unwrap());
@@ -330,7 +332,7 @@ fn assert_costs(gpu: &GpuHeadless, rasterizer: Rasterizer) {
     view.set_shading(sheetsplat::settings::Shading { ambient: 0.5, shininess: 3.0, ..scene.shading }).unwrap();
     assert!(!prepare(&mut view), "shading");
     assert_fresh(gpu, &mut view, "shading");
-    let old = view.volume().transfer().clone();
+    let old = view.volume().transfer()[0].clone();
     let color = Ramp::new(vec![(0.0, DVec3::new(1.0, 0.2, 0.1)), (200.0, DVec3::ONE)]).unwrap();
     // More control points than before, and other opacities above 0 for the same values.
     let opacity = Ramp::new(vec![(60.0, 0.0), (70.0, 0.1), (80.0, 0.4), (100.0, 0.2), (140.0, 0.9)]).unwrap();
@@ -397,7 +399,7 @@ fn after_splatting_a_changed_view_is_a_fresh_one() {
             ("nothing", vec![(0.0, 0.0)]),
             ("as at first", vec![(60.0, 0.0), (120.0, 0.6), (255.0, 1.0)]),
         ] {
-            let old = view.volume().transfer().clone();
+            let old = view.volume().transfer()[0].clone();
             let transfer = TransferFunction { opacity: Ramp::new(points).unwrap(), ..old };
             let touched = view.set_transfer_function(transfer).unwrap();
             let name = format!("{rasterizer:?}: {name}");
@@ -408,7 +410,7 @@ fn after_splatting_a_changed_view_is_a_fresh_one() {
         }
         assert!(changed >= 4 && same >= 2, "{changed} {same}");
         let color = Ramp::new(vec![(0.0, DVec3::new(1.0, 0.2, 0.1))]).unwrap();
-        let transfer = TransferFunction { color, ..view.volume().transfer().clone() };
+        let transfer = TransferFunction { color, ..view.volume().transfer()[0].clone() };
         assert_eq!(view.set_transfer_function(transfer).unwrap(), Touched::default());
         assert!(!prepare(&mut view), "{rasterizer:?}: a colour");
         assert_fresh(gpu, &mut view, "a colour");
@@ -422,7 +424,7 @@ fn from_nothing() {
     for rasterizer in RASTERIZERS {
         let (volume, mut scene) = head();
         scene.splatting.rasterizer = rasterizer;
-        scene.transfer.iso_ranges = Some(vec![[1e6, 2e6]]);
+        scene.channels[0].transfer.iso_ranges = Some(vec![[1e6, 2e6]]);
         let mut view = gpu.view(volume, &scene).unwrap();
         assert_fresh(gpu, &mut view, "nothing");
         assert!(view.set_iso_ranges(None).unwrap().entered > 1000);
@@ -443,7 +445,7 @@ fn the_value_list_leaves_out_the_background() {
     assert!(background > 1000);
     let list = view.volume().value_list();
     assert_eq!(list.bytes(), 4 * (volume.values().len() - background) as u64);
-    let all = TransferFunction { opacity: Ramp::new(vec![(0.0, 1.0)]).unwrap(), ..view.volume().transfer().clone() };
+    let all = TransferFunction { opacity: Ramp::new(vec![(0.0, 1.0)]).unwrap(), ..view.volume().transfer()[0].clone() };
     assert_eq!(list.within(volume.values(), &ValueSet::of(&all)).len(), volume.values().len());
 }
 

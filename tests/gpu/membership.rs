@@ -36,7 +36,7 @@ fn frames_of_label_maps_are_the_twins() {
         }
         scene.splatting.compositing = Compositing::Exponential;
         check(&format!("case {case}"), &volume, &scene);
-        let plain = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+        let plain = reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
         let own = reference::render(&volume, &scene.resolve(&volume), &scene).unwrap();
         assert_at_least(largest_difference(&plain, &own), 0.02, format!("case {case}: by differences"));
     }
@@ -54,7 +54,7 @@ fn memory_is_estimated() {
     for (name, volume) in [("a label map", label_map(&mut random)), ("a segmented volume", segmented(&mut random))] {
         if volume.labels().is_some() {
             scene.shading.gradient = Gradient::Differences;
-            scene.transfer.labels = [(1, own.clone())].into();
+            scene.channels[0].transfer.labels = [(1, own.clone())].into();
         }
         let mut view = gpu().view(volume, &scene).unwrap();
         let estimated = gpu().renderer().estimate(&view).unwrap();
@@ -75,7 +75,7 @@ fn frames_of_segmented_volumes_are_the_twins() {
     for case in 0..3 {
         let (volume, mut scene) = (segmented(&mut random), scene_of_labels(&mut random));
         scene.shading.gradient = Gradient::Differences;
-        scene.transfer.labels =
+        scene.channels[0].transfer.labels =
             [(1, own(true, DVec3::X)), (2, own(true, DVec3::Y)), (3, own(false, DVec3::ONE))].into();
         check(&format!("case {case}"), &volume, &scene);
     }
@@ -88,9 +88,9 @@ fn frames_of_channels_are_the_twins() {
     let (map, mut scene) = (label_map(&mut random), scene_of_labels(&mut random));
     let values = map.values().iter().map(|_| random.uniform(0.0, 3.0) as f32).collect();
     let scan = Volume::new("scan", map.dims(), map.spacing(), values).unwrap();
-    let mut further = sheetsplat::scene::Channel::new(sheetsplat::scene::VolumeSource::Memory);
-    further.transfer = scene.transfer.clone();
-    scene.further.push(further);
+    let mut channel = sheetsplat::scene::Channel::new(sheetsplat::scene::VolumeSource::Memory);
+    channel.transfer = scene.channels[0].transfer.clone();
+    scene.channels.push(channel);
     for (name, volume) in [
         ("a scan behind", map.clone().with_channels("channels", vec![scan.clone()]).unwrap()),
         ("a scan before", scan.with_channels("channels", vec![map]).unwrap()),

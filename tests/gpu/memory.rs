@@ -18,7 +18,7 @@ use crate::common::{RASTERIZERS, scene, transfer};
 
 fn head(size: u32) -> (Volume, Scene) {
     let mut scene = scene(60, 50);
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4])], &[(30.0, 0.0), (120.0, 0.3)]);
+    scene.channels[0].transfer = transfer(&[(40.0, [0.9, 0.6, 0.4])], &[(30.0, 0.0), (120.0, 0.3)]);
     (builtin::volume(&format!("head:{size}")).unwrap(), scene)
 }
 
@@ -112,8 +112,8 @@ fn a_volumes_bytes_are_known_before() {
     let mut view = gpu.view(volume.clone(), &scene).unwrap();
     gpu.draw(&mut view).unwrap();
     assert_eq!(view.volume().gpu_volume().gpu_bytes(), values);
-    let color = scene.transfer.color.clone();
-    scene.transfer.labels = [(1, LabelTables { color, ..LabelTables::default() })].into();
+    let color = scene.channels[0].transfer.color.clone();
+    scene.channels[0].transfer.labels = [(1, LabelTables { color, ..LabelTables::default() })].into();
     let mut view = gpu.view(volume, &scene).unwrap();
     gpu.draw(&mut view).unwrap();
     assert_eq!(view.volume().gpu_volume().gpu_bytes(), both);
@@ -135,14 +135,15 @@ fn a_frames_bytes_are_known_before() {
         scene.splatting.order = Order::BackToFront;
         scenes.push(scene.clone());
         scene.splatting.method = Method::AxisAligned;
-        scene.transfer.labels = [(1, LabelTables { color: scene.transfer.color.clone(), ..Default::default() })].into();
+        scene.channels[0].transfer.labels =
+            [(1, LabelTables { color: scene.channels[0].transfer.color.clone(), ..Default::default() })].into();
         scenes.push(scene);
     }
     let mut every_sample = base.clone();
     every_sample.splatting.method = Method::CompositeEverySample;
     scenes.push(every_sample);
     let mut empty = base.clone();
-    empty.transfer.iso_ranges = Some(vec![[-2.0, -1.0]]);
+    empty.channels[0].transfer.iso_ranges = Some(vec![[-2.0, -1.0]]);
     scenes.push(empty);
     for (name, gpu) in [("roomy", &roomy), ("small", &small), ("profiling", &profiling)] {
         let mut checked = 0;
@@ -185,7 +186,7 @@ fn a_changed_views_bytes_are_known_before() {
     let _alone = alone();
     let gpu = gpu();
     let (volume, mut scene) = head(40);
-    scene.transfer.iso_ranges = Some(vec![[100.0, 110.0]]);
+    scene.channels[0].transfer.iso_ranges = Some(vec![[100.0, 110.0]]);
     for rasterizer in RASTERIZERS {
         scene.splatting.rasterizer = rasterizer;
         let mut view = gpu.view(volume.clone(), &scene).unwrap();
@@ -193,7 +194,7 @@ fn a_changed_views_bytes_are_known_before() {
             view.set_iso_ranges(Some(vec![range])).unwrap();
             let estimate = gpu.renderer().estimate(&view).unwrap();
             let mut again = scene.clone();
-            again.transfer.iso_ranges = Some(vec![range]);
+            again.channels[0].transfer.iso_ranges = Some(vec![range]);
             let mut fresh = gpu.view(volume.clone(), &again).unwrap();
             gpu.renderer().prepare(gpu.device(), gpu.queue(), &mut fresh).unwrap();
             assert_eq!(estimate, fresh.gpu_bytes(), "{rasterizer:?} {range:?}");

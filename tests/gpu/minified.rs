@@ -52,13 +52,14 @@ fn by_all(volume: &Volume, scene: &Scene) -> ([f64; 3], Image) {
 
 /// The f64 image of an orthographic view without the low-pass rule, with footprints of any size.
 fn without_low_pass(volume: &Volume, scene: &Scene) -> Image {
-    let transfer = scene.transfer.resolve(volume);
+    let transfer = scene.channels[0].transfer.resolve(volume);
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
     let mut geometry = Geometry::new(volume.grid(), scene).unwrap();
     let ray = Ray::new(geometry.basis.w, &geometry.basis, volume.grid().aspect());
     (geometry.footprint_from_pixels, geometry.amplitude) = (ray.footprint_from_units * geometry.pix, 1.0);
-    let voxels = shading::taking_part(volume, &transfer, &geometry);
-    let splats = shading::splats(&voxels, volume, &transfer, (scene, &Lights::default()), &geometry);
+    let voxels = shading::taking_part(volume, std::slice::from_ref(&transfer), &geometry);
+    let splats =
+        shading::splats(&voxels, volume, std::slice::from_ref(&transfer), (scene, &Lights::default()), &geometry);
     let mut acc = Buffer::new(scene.image.width, scene.image.height);
     for (k, bucket) in sheets::buckets(&voxels, &splats, &geometry, &kernel) {
         let in_sheet: Vec<_> = bucket.iter().map(|&index| splats[index as usize]).collect();
@@ -93,7 +94,7 @@ fn heads() {
     for (opacity, least) in [(1.0, 34.0), (0.05, 34.0)] {
         let mut scene = scene(320, 320);
         scene.camera.direction = glam::DVec3::new(0.4, 0.9, -0.3);
-        scene.transfer =
+        scene.channels[0].transfer =
             transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (60.0, opacity)]);
         scene.splatting.culling = false;
         let (drawn, _) = by_all(&volume, &scene);

@@ -31,7 +31,8 @@ fn head() -> (Volume, Scene) {
     let volume = builtin::volume("head:32").unwrap();
     let mut scene = scene(96, 80);
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
+    scene.channels[0].transfer =
+        transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
     (volume, scene)
 }
 
@@ -39,7 +40,7 @@ fn head() -> (Volume, Scene) {
 fn empty_volume_is_exactly_the_background() {
     let gpu = gpu();
     let (volume, mut scene) = head();
-    let visible = scene.transfer.clone();
+    let visible = scene.channels[0].transfer.clone();
     let transparent = transfer(&[(0.0, [1.0, 0.5, 0.2])], &[(0.0, 0.0)]);
     let mut excluded = visible.clone();
     excluded.iso_ranges = Some(vec![[1000.0, 2000.0]]);
@@ -47,7 +48,7 @@ fn empty_volume_is_exactly_the_background() {
     let cases = [(transparent, DVec3::ZERO), (excluded, DVec3::ZERO), (visible, elsewhere)];
     let orders = [Order::FrontToBack, Order::BackToFront];
     for (number, (transfer, center)) in cases.into_iter().enumerate() {
-        (scene.transfer, scene.camera.center) = (transfer, Some(center));
+        (scene.channels[0].transfer, scene.camera.center) = (transfer, Some(center));
         for (compositing, order) in (number..)
             .zip(COMPOSITINGS)
             .flat_map(|(turn, compositing)| in_turns(turn, orders).into_iter().map(move |order| (compositing, order)))
@@ -133,7 +134,7 @@ impl UniformSlab {
         }
         scene.image.background = [0.0; 4];
         scene.shading.enabled = false;
-        scene.transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(0.0, Self::OPACITY)]);
+        scene.channels[0].transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(0.0, Self::OPACITY)]);
         scene.splatting.compositing = Compositing::Exponential;
         scene.splatting.slab_width = slab_width;
         self.assert_shows_no_border(&volume, &scene);
@@ -276,7 +277,7 @@ fn every_run_gives_the_same_bytes() {
 fn every_run_after_splatting_gives_the_same_bytes() {
     let (volume, mut scene) = head();
     scene.splatting.classification = Classification::After;
-    scene.transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (120.0, 0.9)]).unwrap());
+    scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (120.0, 0.9)]).unwrap());
     let (first, second) = (gpu(), &new_gpu());
     let perspective = Projection::Perspective { fov_y: 60.0, distance: None, near: None };
     let projections = [scene.camera.projection, perspective];
@@ -299,7 +300,7 @@ fn constant_colour_is_constant_colour_times_alpha() {
     let gpu = gpu();
     let (volume, mut scene) = head();
     let color = [0.3, 0.61, 0.97];
-    scene.transfer = transfer(&[(0.0, color)], &[(30.0, 0.0), (200.0, 1.0)]);
+    scene.channels[0].transfer = transfer(&[(0.0, color)], &[(30.0, 0.0), (200.0, 1.0)]);
     scene.shading.enabled = false;
     scene.image.background = [0.0; 4];
     for (drawing, compositing) in DRAWINGS

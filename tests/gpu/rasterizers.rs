@@ -20,7 +20,8 @@ use crate::common::{BY_AMOUNTS, RASTERIZERS, Random, scene, transfer};
 fn head() -> (Volume, Scene) {
     let mut scene = scene(90, 75);
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
+    scene.channels[0].transfer =
+        transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
     (builtin::volume("head:32").unwrap(), scene)
 }
 
@@ -57,7 +58,7 @@ fn refusal(gpu: &GpuHeadless, volume: &Volume, scene: &Scene) -> (String, String
 /// More than the tile rasterizer supports behind a tile: 2744 bricks in two pixels and four sheets.
 fn crowded() -> (Volume, Scene) {
     let mut scene = scene(2, 2);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.001)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.001)]);
     scene.splatting.slab_width = 8.0;
     let values = vec![1.0; 56 * 56 * 56];
     (Volume::new("crowded", UVec3::splat(56), DVec3::ONE, values).unwrap(), scene)
@@ -105,7 +106,7 @@ fn tiles_need_no_subgroups() {
         }),
         ("many control points", |scene| {
             let opacity: Vec<_> = (0..40).map(|at| (f64::from(at) * 6.0, f64::from(at % 5) * 0.02)).collect();
-            scene.transfer = transfer(&[(0.0, [0.9, 0.8, 0.7])], &opacity);
+            scene.channels[0].transfer = transfer(&[(0.0, [0.9, 0.8, 0.7])], &opacity);
         }),
         ("kernel, exact", |scene| {
             (scene.splatting.classification, scene.splatting.interpolation) =
@@ -119,7 +120,7 @@ fn tiles_need_no_subgroups() {
         ("surface", |scene| {
             let splatting = &mut scene.splatting;
             (splatting.classification, splatting.compositing) = (Classification::After, Compositing::Surface);
-            scene.transfer = transfer(&[(0.0, [0.9, 0.6, 0.4])], &[(60.0, 0.0), (100.0, 1.0)]);
+            scene.channels[0].transfer = transfer(&[(0.0, [0.9, 0.6, 0.4])], &[(60.0, 0.0), (100.0, 1.0)]);
         }),
         ("average", |scene| {
             let splatting = &mut scene.splatting;
@@ -163,7 +164,8 @@ fn channels_need_no_subgroups() {
     let volume = volume.with_channels("both", vec![other]).unwrap();
     let mut channel = Channel::new(VolumeSource::Memory);
     channel.transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(100.0, 0.0), (200.0, 0.1)]);
-    (scene.splatting.rasterizer, scene.further) = (Rasterizer::Tiles, vec![channel]);
+    scene.splatting.rasterizer = Rasterizer::Tiles;
+    scene.channels.push(channel);
     for (classification, culling) in [
         (Classification::Before, true),
         (Classification::Before, false),

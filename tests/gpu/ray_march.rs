@@ -27,7 +27,7 @@ impl Marched {
         let lines = |size: u32| (0..size).step_by(stride as usize);
         let at: Vec<UVec2> =
             lines(scene.image.height).flat_map(|y| lines(scene.image.width).map(move |x| UVec2::new(x, y))).collect();
-        let pixels = ray_march::pixels(volume, &scene.transfer.resolve(volume), scene, &at).unwrap();
+        let pixels = ray_march::pixels(volume, &[scene.channels[0].transfer.resolve(volume)], scene, &at).unwrap();
         Self { at, pixels }
     }
 
@@ -42,7 +42,7 @@ fn twin(volume: &Volume, scene: &Scene) -> Image {
     let mut scene = scene.clone();
     // Rays march to their ends.
     scene.splatting.culling = false;
-    reference::render(volume, &scene.transfer.resolve(volume), &scene).unwrap()
+    reference::render(volume, &[scene.channels[0].transfer.resolve(volume)], &scene).unwrap()
 }
 
 /// Asserts that the f64 evaluation, the GPU and the native backend come as close to the march as required, in dB.
@@ -80,7 +80,8 @@ fn anisotropic_head() {
     let mut scene = scene(192, 192);
     scene.camera = camera([0.4, 0.9, -0.3], 1.0);
     scene.camera.projection = Projection::Perspective { fov_y: 25.0, distance: None, near: None };
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.1)]);
+    scene.channels[0].transfer =
+        transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.1)]);
     scene.splatting.compositing = Compositing::Exponential;
     assert_close("builtin:head:64 at 1:1:4", volume, scene, 2, 55.0);
 }
@@ -100,7 +101,8 @@ fn shared_quarter_head() {
 fn thin_slabs() {
     let volume = builtin::volume("head:32").unwrap().with_spacing("head", DVec3::new(1.0, 1.0, 3.0)).unwrap();
     let mut scene = scene(72, 60);
-    scene.transfer = transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
+    scene.channels[0].transfer =
+        transfer(&[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(30.0, 0.0), (120.0, 0.3)]);
     scene.camera = camera([0.4, 0.9, -0.3], 60.0);
     scene.splatting.compositing = Compositing::Exponential;
     let marched = Marched::new(&volume, &scene, 1);

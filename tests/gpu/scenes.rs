@@ -14,10 +14,10 @@ use crate::common::{scene, transfer};
 fn views_of_every_backend_change_their_scenes() {
     let volume = std::sync::Arc::new(builtin::volume("head:12").unwrap());
     let mut first = scene(24, 24);
-    first.transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
+    first.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
     let turned = Scene { camera: first.camera.turned(30.0), ..first.clone() };
     let mut other = turned.clone();
-    other.transfer = transfer(&[(0.0, [1.0, 0.5, 0.2])], &[(60.0, 0.0), (100.0, 0.9)]);
+    other.channels[0].transfer = transfer(&[(0.0, [1.0, 0.5, 0.2])], &[(60.0, 0.0), (100.0, 0.9)]);
     let all = [Backend::Gpu, Backend::Cpu, Backend::Reference];
     let headless = all.map(|backend| Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap());
     for headless in &headless {
@@ -45,7 +45,7 @@ fn directions_have_any_length() {
         .map(|backend| Headless::new(&HeadlessOptions::default().with_backend(backend)).unwrap());
     let scene = |length: f64| {
         let mut scene = scene(24, 24);
-        scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
+        scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
         scene.camera.direction = DVec3::new(0.4, 0.9, -0.3) * length;
         scene.camera.up = DVec3::Z * length;
         scene.shading.light = Light::Direction(DVec3::new(0.5, -0.7, 0.6) * length);

@@ -61,7 +61,12 @@ const SHARE: &[f64] = &[-0.001, 1.001];
 const THRESHOLD: &[f64] = &[0.0, -0.001, 1.001];
 
 const FIELDS: &[Field] = &[
-    field("volume.spacing[1]", |scene, x| scene.spacing = Some(DVec3::new(1.0, x, 1.0)), &[1.0], &[0.0, -1.0, 1e-101]),
+    field(
+        "volume.spacing[1]",
+        |scene, x| scene.channels[0].spacing = Some(DVec3::new(1.0, x, 1.0)),
+        &[1.0],
+        &[0.0, -1.0, 1e-101],
+    ),
     field(
         "camera.height",
         |scene, x| scene.camera.projection = Projection::Orthographic { height: Some(x) },
@@ -92,21 +97,31 @@ const FIELDS: &[Field] = &[
     field("clip.crop[1][0]", |scene, x| scene.clip.crop = Some([-DVec3::ONE, DVec3::new(x, 1.0, 1.0)]), &[1e300], &[]),
     field(
         "transfer.color[0][1][2]",
-        |scene, x| scene.transfer.color = Some(Ramp::new(vec![(0.0, DVec3::new(0.0, 1.0, x))]).unwrap()),
+        |scene, x| scene.channels[0].transfer.color = Some(Ramp::new(vec![(0.0, DVec3::new(0.0, 1.0, x))]).unwrap()),
         &[0.0, 1.0],
         SHARE,
     ),
-    field("transfer.opacity[0][1]", |scene, x| scene.transfer.opacity = share(x), &[0.0, 1.0], SHARE),
-    field("transfer.gradient_opacity[0][1]", |scene, x| scene.transfer.gradient_opacity = share(x), &[0.0, 1.0], SHARE),
+    field("transfer.opacity[0][1]", |scene, x| scene.channels[0].transfer.opacity = share(x), &[0.0, 1.0], SHARE),
+    field(
+        "transfer.gradient_opacity[0][1]",
+        |scene, x| scene.channels[0].transfer.gradient_opacity = share(x),
+        &[0.0, 1.0],
+        SHARE,
+    ),
     field(
         "transfer.iso_ranges[0][1]",
-        |scene, x| scene.transfer.iso_ranges = Some(vec![[-1e300, x]]),
+        |scene, x| scene.channels[0].transfer.iso_ranges = Some(vec![[-1e300, x]]),
         &[-1e300, 1e300],
         &[],
     ),
     field(
         "transfer.label[0].opacity[0][1]",
-        |scene, x| _ = scene.transfer.labels.insert(0, LabelTables { opacity: share(x), ..LabelTables::default() }),
+        |scene, x| {
+            _ = scene.channels[0]
+                .transfer
+                .labels
+                .insert(0, LabelTables { opacity: share(x), ..LabelTables::default() });
+        },
         &[0.0, 1.0],
         SHARE,
     ),
@@ -177,7 +192,7 @@ fn set_all(view: &mut SceneView, scene: &Scene, transfer: &TransferFunction) -> 
 fn invalid_values_have_the_same_key_everywhere() {
     let gpu = gpu();
     let volume = scene().load_volume().unwrap();
-    let transfer = scene().transfer.resolve(&volume);
+    let transfer = scene().channels[0].transfer.resolve(&volume);
     let mut view = gpu.view(volume.clone(), &scene()).unwrap();
     let before = view.scene().clone();
     let mut native = CpuRenderer::new(volume.clone(), &scene()).unwrap();
@@ -202,18 +217,18 @@ fn invalid_values_have_the_same_key_everywhere() {
             refused(gpu.render_volume(volume.clone(), &scene).map(|_| ()));
             refused(cpu::render(volume.clone(), &scene).map(|_| ()));
             refused(native.set_scene(&scene));
-            refused(reference::render(&volume, &transfer, &scene).map(|_| ()));
+            refused(reference::render(&volume, std::slice::from_ref(&transfer), &scene).map(|_| ()));
             match gpu.render(&scene) {
                 Err(Error::Render(error)) => refused(Err(error)),
                 other => panic!("{key} = {value}: {:?}", other.map(|rendering| rendering.stats)),
             }
             // Spacing belongs to the volume, not to a view.
-            if scene.spacing.is_none() {
-                let transfer = scene.transfer.resolve(&volume);
+            if scene.channels[0].spacing.is_none() {
+                let transfer = scene.channels[0].transfer.resolve(&volume);
                 refused(set_all(&mut view, &scene, &transfer).map_err(RenderError::from));
                 refused(if transfer.check().is_err() {
                     let good = self::scene();
-                    reference::render(&volume, &transfer, &good).map(|_| ())
+                    reference::render(&volume, std::slice::from_ref(&transfer), &good).map(|_| ())
                 } else {
                     scene.check().map_err(RenderError::from)
                 });
@@ -234,7 +249,7 @@ fn the_ends_of_ranges_are_allowed_and_drawn() {
             let (key, scene) = (field.key, field.with(value));
             scene.check().unwrap();
             assert_eq!(field.parsed(value).unwrap(), scene, "{key} = {value}");
-            set_all(&mut view, &scene, &scene.transfer.resolve(&volume)).unwrap();
+            set_all(&mut view, &scene, &scene.channels[0].transfer.resolve(&volume)).unwrap();
             let drawn = gpu.draw(&mut view).unwrap_or_else(|error| panic!("{key} = {value}: {error}"));
             let is_finite = |image: &Image| image.pixels.iter().flatten().all(|channel| channel.is_finite());
             assert!(is_finite(&drawn.image), "{key} = {value}");
@@ -258,7 +273,7 @@ fn settings_that_exclude_each_other_have_the_same_key_everywhere() {
     let volume = builtin::volume("head:16").unwrap();
     let mut view = gpu.view(volume.clone(), &scene()).unwrap();
     let cases: [(&str, Change); 13] = [
-        ("volume.spacing", |scene| scene.spacing = Some(DVec3::new(1.0, 1.0, 10001.0))),
+        ("volume.spacing", |scene| scene.channels[0].spacing = Some(DVec3::new(1.0, 1.0, 10001.0))),
         ("camera.direction", |scene| scene.camera.direction = DVec3::ZERO),
         ("camera.up", |scene| scene.camera.up = DVec3::ZERO),
         ("camera.up", |scene| scene.camera.up = -1e200 * scene.camera.direction),
@@ -266,8 +281,8 @@ fn settings_that_exclude_each_other_have_the_same_key_everywhere() {
         ("clip.planes", |scene| scene.clip.planes = vec![[1.0, 0.0, 0.0, 0.0]; 7]),
         ("clip.planes[0]", |scene| scene.clip.planes = vec![[0.0, 0.0, 0.0, 1.0]]),
         ("clip.crop", |scene| scene.clip.crop = Some([DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0)])),
-        ("transfer.iso_ranges", |scene| scene.transfer.iso_ranges = Some(Vec::new())),
-        ("transfer.iso_ranges[1]", |scene| scene.transfer.iso_ranges = Some(vec![[0.0, 0.0], [2.0, 1.0]])),
+        ("transfer.iso_ranges", |scene| scene.channels[0].transfer.iso_ranges = Some(Vec::new())),
+        ("transfer.iso_ranges[1]", |scene| scene.channels[0].transfer.iso_ranges = Some(vec![[0.0, 0.0], [2.0, 1.0]])),
         ("shading.light", |scene| scene.shading.light = Light::Direction(DVec3::ZERO)),
         ("splatting.compositing", |scene| {
             (scene.splatting.compositing, scene.splatting.method) =
@@ -293,8 +308,8 @@ fn settings_that_exclude_each_other_have_the_same_key_everywhere() {
                 other => panic!("{expected}: {other:?}"),
             }
         }
-        if scene.spacing.is_none() {
-            let transfer = scene.transfer.resolve(&volume);
+        if scene.channels[0].spacing.is_none() {
+            let transfer = scene.channels[0].transfer.resolve(&volume);
             assert_eq!(set_all(&mut view, &scene, &transfer).unwrap_err().key, expected);
         }
     }
@@ -312,8 +327,9 @@ fn settings_only_hosts_have_are_checked() {
     }
     for opacity in NOT_FINITE.iter().chain(THRESHOLD) {
         assert_eq!(view.set_first_hit(Some(*opacity)).unwrap_err().key, "first_hit");
-        let (host, transfer) = (Host { first_hit: Some(*opacity), surfaces: None }, scene().transfer.resolve(&volume));
-        match reference::render_for(host, &volume, &transfer, &scene(), None) {
+        let (host, transfer) =
+            (Host { first_hit: Some(*opacity), surfaces: None }, scene().channels[0].transfer.resolve(&volume));
+        match reference::render_for(host, &volume, std::slice::from_ref(&transfer), &scene(), None) {
             Err(RenderError::OutOfRange(error)) => assert_eq!(error.key, "first_hit"),
             other => panic!("{other:?}"),
         }
@@ -330,10 +346,10 @@ fn settings_only_hosts_have_are_checked() {
         assert_eq!(native.set_first_hit(Some(*opacity)).unwrap_err().key, "first_hit");
     }
     assert_eq!(native.scene(), &before);
-    let transfer = scene().transfer.resolve(&volume);
+    let transfer = scene().channels[0].transfer.resolve(&volume);
     for (surfaces, key) in [(vec![1.0; 24 * 18 - 1], "surfaces"), (vec![NAN; 24 * 18], "surfaces[0]")] {
         let host = Host { surfaces: Some(&surfaces), first_hit: None };
-        match reference::render_for(host, &volume, &transfer, &scene(), None) {
+        match reference::render_for(host, &volume, std::slice::from_ref(&transfer), &scene(), None) {
             Err(RenderError::OutOfRange(error)) => assert_eq!(error.key, key),
             other => panic!("{other:?}"),
         }

@@ -38,7 +38,7 @@ fn image_aligned_sheets_do_not_pop() {
     let gpu = gpu();
     let volume = Arc::new(builtin::volume("nerve:256").unwrap());
     let mut scene = scene(128, 128);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(30.0, 0.0), (90.0, 0.2)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(30.0, 0.0), (90.0, 0.2)]);
     let changes = [Method::ImageAligned, Method::AxisAligned].map(|method| {
         scene.splatting.method = method;
         let mut view = gpu.view(volume.clone(), &scene).unwrap();

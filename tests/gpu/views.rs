@@ -27,7 +27,7 @@ fn random_case(random: &mut Random) -> (Volume, Scene) {
     }
     let (haze, solid) = (random.pick(&[0.0, 0.02, 0.2]), random.pick(&[0.3, 0.9, 1.0]));
     let opacity = [(5.0, 0.0), (20.0, haze), (200.0, solid)];
-    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
+    scene.channels[0].transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
     let fixed = Light::Direction(random.direction());
     scene.shading.light = random.pick(&[Light::Headlight, fixed]);
     scene.splatting.compositing = random.pick(&BY_AMOUNTS);
@@ -53,10 +53,10 @@ fn any_view_equals_the_reference() {
     let mut seen = 0;
     for case in 0..24 {
         let (volume, scene) = random_case(&mut random);
-        let transfer = scene.transfer.resolve(&volume);
-        let expected = reference::render(&volume, &transfer, &scene).unwrap();
+        let transfer = scene.channels[0].transfer.resolve(&volume);
+        let expected = reference::render(&volume, std::slice::from_ref(&transfer), &scene).unwrap();
         let all = |counts: &Counts| [counts.voxels_in_range, counts.sections_total, counts.sheets, counts.tiles_total];
-        let counts = reference::count(&volume, &transfer, &scene).unwrap();
+        let counts = reference::count(&volume, std::slice::from_ref(&transfer), &scene).unwrap();
         seen += usize::from(expected.pixels.iter().filter(|pixel| **pixel != BLACK).count() > 100);
         for (at, rasterizer) in RASTERIZERS.into_iter().enumerate() {
             let [forwards, backwards] =

@@ -7,7 +7,7 @@ use sheetsplat::Image;
 use sheetsplat::headless::Backend;
 use sheetsplat::scene::{Scene, VolumeSource};
 use sheetsplat::settings::{Region, Window};
-use sheetsplat::volume::{SampleType, StreamedChannel, StreamedLevel, StreamedVolume, Volume, builtin};
+use sheetsplat::volume::{Channels, SampleType, StreamedChannel, StreamedLevel, StreamedVolume, Volume, builtin};
 
 use crate::common::compare::{assert_at_least, assert_at_most};
 use crate::common::images::{largest_difference, psnr};
@@ -33,9 +33,9 @@ pub(crate) fn volume(channels: u32, has_labels: bool) -> Volume {
         let values = (0..head.dims().element_product()).map(mirrored).collect();
         Volume::new("head", head.dims(), head.spacing(), values).unwrap()
     };
-    let further = (1..channels).map(channel).collect();
+    let others = (1..channels).map(channel).collect();
     let first = if has_labels { head.clone() } else { channel(0) };
-    first.with_channels("head", further).unwrap()
+    first.with_channels("head", others).unwrap()
 }
 
 /// The bytes of a volume's values, colours and labels.
@@ -64,15 +64,14 @@ pub(crate) fn streamed(volume: &Volume) -> (Vec<Arc<MemoryStore>>, StreamedVolum
         .map(|(number, channel)| Arc::new(MemoryStore::new(channel, UVec3::new(8 + number, 12, 10))))
         .collect();
     let level = |store: &Arc<MemoryStore>| StreamedLevel::new("store", store.clone(), 0);
-    let mut channels: Vec<StreamedChannel> = stores.iter().map(|store| level(store).into()).collect();
-    let mut first = channels.remove(0);
+    let mut channels = Channels::of(stores.iter().map(|store| StreamedChannel::from(level(store)))).unwrap();
     if let Some(labels) = volume.labels() {
         let values = labels.iter().map(|&label| label.into()).collect();
         let labels = Volume::new("labels", volume.dims(), DVec3::ONE, values).unwrap();
         stores.push(Arc::new(MemoryStore { identity: "labels", ..MemoryStore::new(&labels, UVec3::splat(7)) }));
-        first = first.with_labels(level(&stores[stores.len() - 1])).unwrap();
+        *channels.first_mut() = channels.first().clone().with_labels(level(&stores[stores.len() - 1])).unwrap();
     }
-    (stores, StreamedVolume { first, further: channels, sample: Arc::new(volume.clone()), memory })
+    (stores, StreamedVolume { channels, sample: Arc::new(volume.clone()), memory })
 }
 
 /// A scene of a volume of several channels, or of one.
@@ -137,8 +136,8 @@ fn several_channels_are_those_of_the_volume_in_memory() {
 #[test]
 fn colors_are_those_of_the_volume_in_memory() {
     for (channels, sets) in [(1, SCENES[0]), (1, SCENES[1]), (2, SCENES[2]), (1, SCENES[3]), (2, SCENES[4])] {
-        let further = if channels == 2 { vec![volume(1, false)] } else { Vec::new() };
-        let volume = colored().with_channels("head", further).unwrap();
+        let others = if channels == 2 { vec![volume(1, false)] } else { Vec::new() };
+        let volume = colored().with_channels("head", others).unwrap();
         for backend in BACKENDS {
             assert_same(backend, &volume, &scene(channels, sets));
         }
@@ -236,20 +235,17 @@ fn parts_of_several_channels_merge() {
             StreamedLevel::new("another", Arc::new(store), 0)
         };
         let values = another(&volume);
-        let labels = StreamedLevel { level: 0, ..streamed.first.labels.clone().unwrap() };
+        let first = streamed.channels.first();
+        let labels = StreamedLevel { level: 0, ..first.labels.clone().unwrap() };
         let window = Window { slabs: 0..0, region: Region { x: 0, y: 0, width: 1, height: 1 } };
-        for other in [
-            StreamedVolume { further: vec![values.clone().into()], ..streamed.clone() },
-            StreamedVolume {
-                first: StreamedChannel { values: values.clone(), ..streamed.first.clone() },
-                ..streamed.clone()
-            },
-            StreamedVolume {
-                first: StreamedChannel { labels: Some(values), ..streamed.first.clone() },
-                ..streamed.clone()
-            },
-            StreamedVolume { first: StreamedChannel { values: labels, ..streamed.first.clone() }, ..streamed.clone() },
+        for (number, channel) in [
+            (1, values.clone().into()),
+            (0, StreamedChannel { values: values.clone(), ..first.clone() }),
+            (0, StreamedChannel { labels: Some(values), ..first.clone() }),
+            (0, StreamedChannel { values: labels, ..first.clone() }),
         ] {
+            let mut other = streamed.clone();
+            other.channels[number] = channel;
             let mut view = headless.view(other, &scene).unwrap();
             fingerprints.push(headless.draw_part(&mut view, &window).unwrap().0.identity.fingerprint);
         }
@@ -264,40 +260,40 @@ fn parts_of_several_channels_merge() {
 #[test]
 fn channels_that_do_not_belong_together_are_refused() {
     let volume = volume(2, true);
-    let (_, StreamedVolume { first, further, .. }) = streamed(&volume);
+    let (_, StreamedVolume { channels, .. }) = streamed(&volume);
+    let [first, second] = &*channels else { panic!("two channels") };
     let level = |name: &str, dims: UVec3, spacing: f64, value: f32| {
         let values = (0..dims.element_product()).map(|_| value).collect();
         let volume = Volume::new("other", dims, DVec3::splat(spacing), values).unwrap();
         StreamedLevel::new(name, Arc::new(MemoryStore::new(&volume, UVec3::splat(16))), 0)
     };
     let (dims, spacing) = (volume.dims(), volume.spacing().x);
-    let open = |first: &StreamedChannel, further: StreamedChannel| {
-        StreamedVolume::of_channels(first.clone(), vec![further], 1 << 22)
+    let open = |first: &StreamedChannel, second: StreamedChannel| {
+        StreamedVolume::of_channels(Channels::new(first.clone(), [second]), 1 << 22)
             .map(|_| ())
             .map_err(|error| error.to_string())
     };
-    assert_eq!(open(&first, further[0].clone()), Ok(()));
+    assert_eq!(open(first, second.clone()), Ok(()));
     for (other, expected) in [
         (level("pet", dims - 1, spacing, 1.0).into(), "pet: channel[1].volume: found a grid of "),
         (level("pet", dims, spacing * 1.01, 1.0).into(), "pet: channel[1].volume: found a grid of "),
-        (StreamedLevel { level: 1, ..further[0].values.clone() }.into(), "store: level: found 1, allowed: 0 to 0"),
-        (further[0].clone().with_labels(level("seg", dims + 1, 1.0, 1.0)).unwrap(), "seg: labels: found a grid of "),
-        (
-            further[0].clone().with_labels(level("seg", dims, 1.0, 0.5)).unwrap(),
-            "seg: data: found 0.5 at voxel [0, 0, 0]",
-        ),
-        (further[0].clone().with_labels(level("seg", dims, 1.0, 65536.0)).unwrap(), "seg: data: found 65536 at voxel"),
+        (StreamedLevel { level: 1, ..second.values.clone() }.into(), "store: level: found 1, allowed: 0 to 0"),
+        (second.clone().with_labels(level("seg", dims + 1, 1.0, 1.0)).unwrap(), "seg: labels: found a grid of "),
+        (second.clone().with_labels(level("seg", dims, 1.0, 0.5)).unwrap(), "seg: data: found 0.5 at voxel [0, 0, 0]"),
+        (second.clone().with_labels(level("seg", dims, 1.0, 65536.0)).unwrap(), "seg: data: found 65536 at voxel"),
     ] {
-        let error = open(&first, other).unwrap_err();
+        let error = open(first, other).unwrap_err();
         assert!(error.starts_with(expected), "{error}");
     }
-    let error = open(&first, level("pet", dims - 1, spacing, 1.0).into()).unwrap_err();
+    let error = open(first, level("pet", dims - 1, spacing, 1.0).into()).unwrap_err();
     assert!(error.ends_with(", for a volume that is streamed, or more memory"), "{error}");
 
     // A label that the sample does not show is found when it is read.
     let seg = first.clone().with_labels(level("seg", dims, 1.0, 0.5)).unwrap();
     let (_, streamed) = streamed(&volume);
-    let error = headless(Backend::Cpu).render_volume(StreamedVolume { first: seg, ..streamed.clone() }, &scene(2, &[]));
+    let mut other = streamed.clone();
+    *other.channels.first_mut() = seg;
+    let error = headless(Backend::Cpu).render_volume(other, &scene(2, &[]));
     let error = error.unwrap_err().to_string();
     assert!(error.starts_with("seg: data: found 0.5 at voxel [") && error.contains("labels, whole numbers"), "{error}");
     // A sample of fewer channels, or without labels.
@@ -310,7 +306,7 @@ fn channels_that_do_not_belong_together_are_refused() {
     }
     // What was put together by hand is checked, too.
     let mut other = streamed.clone();
-    other.further[0].values = level("pet", dims - 1, spacing, 1.0);
+    other.channels[1].values = level("pet", dims - 1, spacing, 1.0);
     let error = headless(Backend::Cpu).view(other, &scene(2, &[])).unwrap_err().to_string();
     assert!(error.starts_with("pet: channel[1].volume: found a grid of "), "{error}");
 }
@@ -337,7 +333,7 @@ fn parts_of_images_that_add_up_merge() {
             let mut view = headless.view(streamed(&volume).1, &scene).unwrap();
             let whole = headless.draw(&mut view).unwrap().image;
             let parts = in_four(headless, &mut view);
-            assert_eq!(parts[0].further.len(), 1);
+            assert_eq!(parts[0].contents.len(), 2);
             let merged = Image::merge(parts).unwrap();
             assert_at_most(largest_difference(&merged, &whole), 1e-6, format!("{backend} {compositing}"));
             let (_, stats) = headless.draw_part(&mut view, &Window::whole([61, 47])).unwrap();

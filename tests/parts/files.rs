@@ -38,7 +38,8 @@ fn files_hold_all_of_a_part() {
     ] {
         let parts = parts_of(compositing, classification);
         assert_eq!(parts.len(), 8);
-        let has_extremes = |part: &Part| part.content.extremes.iter().any(|extreme| extreme.counted >= Extreme::POINT);
+        let has_extremes =
+            |part: &Part| part.contents[0].extremes.iter().any(|extreme| extreme.counted >= Extreme::POINT);
         assert_eq!(parts.iter().all(has_extremes), classification == Classification::After);
         for part in &parts {
             for extension in ["exr", "npz"] {
@@ -63,7 +64,7 @@ fn a_part_is_also_an_image() {
     part.save(&path).unwrap();
     let image = Image::open(&path).unwrap();
     let shown = image.pixels.iter().filter(|pixel| pixel[3] > 0.0).count();
-    assert_eq!(shown, part.content.colors.iter().filter(|pixel| pixel[3] > 0.0).count());
+    assert_eq!(shown, part.contents[0].colors.iter().filter(|pixel| pixel[3] > 0.0).count());
 }
 
 fn refused(parts: impl IntoIterator<Item = Part>) -> String {
@@ -108,7 +109,7 @@ fn gaps_and_overlaps_are_named() {
     // Regions of which one reaches into the other.
     let mut wide = parts.clone();
     wide[0].window.region.width += 1;
-    wide[0].content.colors.extend(vec![[0.0; 4]; region.height as usize]);
+    wide[0].contents[0].colors.extend(vec![[0.0; 4]; region.height as usize]);
     // It shares pixels with other slabs of its own region: nothing is shown twice, but the parts cannot be joined.
     let message = refused(wide.clone());
     assert!(
@@ -139,7 +140,7 @@ fn parts_of_other_images_are_refused() {
     assert!(with(&|part| part.identity.slabs.end += 1).contains("scene's slabs: found"));
     assert!(with(&|part| part.identity.fingerprint = "0".to_owned()).contains("scene: found 0, allowed: "));
     let mut short = parts.clone();
-    short[2].content.colors.pop();
+    short[2].contents[0].colors.pop();
     assert!(refused(short).contains("pixels: found"));
 }
 
@@ -154,7 +155,7 @@ fn fingerprints_tell_images_apart() {
     assert_eq!(first.len(), 64);
     // What names the volume, or draws it, does not matter.
     let mut named = scene.clone();
-    named.volume = sheetsplat::scene::VolumeSource::File("elsewhere/head.nrrd".into());
+    named.channels[0].volume = sheetsplat::scene::VolumeSource::File("elsewhere/head.nrrd".into());
     named.splatting.rasterizer = sheetsplat::settings::Rasterizer::Quads;
     assert_eq!(first, fingerprint(&volume, &named));
     let reference = crate::merging::headless(Backend::Reference);

@@ -7,7 +7,7 @@ use sheetsplat::Image;
 use sheetsplat::headless::Backend;
 use sheetsplat::internals::fingerprint;
 use sheetsplat::scene::{OpenVolume, Scene};
-use sheetsplat::volume::{Grid, StoreLevel, StreamedLevel, StreamedVolume, Volume};
+use sheetsplat::volume::{Grid, StoreLevel, StreamedChannel, StreamedLevel, StreamedVolume, Volume};
 
 use crate::channels::{BACKENDS, bytes, scene, streamed, volume};
 use crate::common::compare::{assert_at_least, assert_at_most};
@@ -114,9 +114,9 @@ fn what_light_is_made_of_enters_the_fingerprint() {
         let grid = Grid::new(UVec3::splat(side), DVec3::ONE);
         let mut store = MemoryStore::new(&volume, UVec3::splat(64));
         store.levels = [StoreLevel { grid, chunk: UVec3::splat(64) }];
-        let first = StreamedLevel::new("store", Arc::new(store), 0).into();
+        let channels = StreamedChannel::from(StreamedLevel::new("store", Arc::new(store), 0)).into();
         let sample = Arc::new(volume.clone());
-        OpenVolume::Streamed(StreamedVolume { first, further: Vec::new(), sample, memory: 1 << 30 })
+        OpenVolume::Streamed(StreamedVolume { channels, sample, memory: 1 << 30 })
     };
     let scene = lit(1, &[]);
     let with_light = |side| fingerprint(&of_side(side), &scene).unwrap();

@@ -26,7 +26,7 @@ fn means(size: u32) -> (Arc<Volume>, Scene) {
     scene.splatting.classification = Classification::After;
     scene.splatting.slab_width = 4.0;
     scene.camera.direction = DVec3::new(0.9, 0.5, -0.8);
-    scene.transfer.iso_ranges = Some(vec![[-1.0, 70.0], [90.0, 300.0]]);
+    scene.channels[0].transfer.iso_ranges = Some(vec![[-1.0, 70.0], [90.0, 300.0]]);
     (volume, scene)
 }
 
@@ -60,7 +60,7 @@ fn parts_merge_by_every_backend() {
 /// Some pixels' means are of many points in several parts, some have one point, and some only the middle of their rays.
 fn compare_ranges(backend: Backend, volume: &Arc<Volume>, scene: &Scene) {
     let all = merging_parts(backend, volume, scene);
-    let counts: Vec<f32> = all.iter().flat_map(|part| &part.content.extremes).map(|mean| mean.counted).collect();
+    let counts: Vec<f32> = all.iter().flat_map(|part| &part.contents[0].extremes).map(|mean| mean.counted).collect();
     for counted in [0.0, Extreme::MIDDLE, Extreme::POINT, 4.0] {
         assert!(counts.contains(&counted), "{backend} {counted}");
     }
@@ -154,7 +154,7 @@ fn labelled(size: u32) -> (Arc<Volume>, Scene) {
     let opacity = Ramp::new(vec![(0.0, 0.0), (60.0, 0.9)]).unwrap();
     let own = LabelTables { color: Some(color), opacity: Some(opacity), ..LabelTables::default() };
     let hidden = LabelTables { visible: false, ..LabelTables::default() };
-    scene.transfer.labels = BTreeMap::from([(0, hidden), (3, own)]);
+    scene.channels[0].transfer.labels = BTreeMap::from([(0, hidden), (3, own)]);
     (Arc::new(Volume::clone(&volume).with_labels(labels).unwrap()), scene)
 }
 
@@ -171,7 +171,7 @@ fn labels_in_the_middle_of_rays_decide() {
             scene.clip.crop = crop;
             for backend in [Backend::Cpu, Backend::Reference, Backend::Gpu] {
                 let all = merging_parts(backend, &volume, &scene);
-                let means = || all.iter().flat_map(|part| &part.content.extremes);
+                let means = || all.iter().flat_map(|part| &part.contents[0].extremes);
                 let noted = |label: f32| means().any(|mean| mean.label == label && mean.counted >= Extreme::POINT);
                 assert!([0.0, 3.0, 6.0].into_iter().all(noted));
             }
@@ -183,7 +183,7 @@ fn labels_in_the_middle_of_rays_decide() {
 #[test]
 fn files_hold_labels_and_their_tables() {
     let (volume, scene) = labelled(24);
-    let has_label = |part: &Part| part.content.extremes.iter().any(|mean| mean.label == 3.0);
+    let has_label = |part: &Part| part.contents[0].extremes.iter().any(|mean| mean.label == 3.0);
     let part = parts(headless(Backend::Cpu), &volume, &scene, 2).into_iter().find(has_label).unwrap();
     let folder = tempfile::tempdir().unwrap();
     for name in ["part.npz", "part.exr"] {

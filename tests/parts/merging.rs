@@ -45,9 +45,9 @@ pub(crate) fn head(size: u32, [width, height]: [u32; 2]) -> (Arc<Volume>, Scene)
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
     scene.camera.fit = Fit::Object;
     // Even air is seen, so that minima and averages are not empty.
-    scene.transfer.color =
+    scene.channels[0].transfer.color =
         Some(Ramp::new(vec![(0.0, DVec3::new(0.3, 0.5, 0.9)), (255.0, DVec3::new(1.0, 0.8, 0.4))]).unwrap());
-    scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.02), (60.0, 0.05), (255.0, 0.7)]).unwrap());
+    scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.02), (60.0, 0.05), (255.0, 0.7)]).unwrap());
     scene.image.background = [0.2, 0.4, 0.6, 0.5];
     scene.splatting.opacity_threshold = 1.0;
     (Arc::new(volume), scene)
@@ -110,7 +110,7 @@ fn scenes(compositing: Compositing, classification: Classification, size: u32) -
         scene.splatting.compositing = compositing;
         scene.splatting.classification = classification;
         if compositing == Compositing::Surface {
-            scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (40.0, 0.7), (255.0, 0.9)]).unwrap());
+            scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (40.0, 0.7), (255.0, 0.9)]).unwrap());
         }
         (volume, scene)
     };
@@ -146,9 +146,9 @@ fn with_channel((volume, mut scene): (Arc<Volume>, Scene)) -> (Arc<Volume>, Scen
     let waves = (0..volume.dims().element_product()).map(|index| 100.0 + 90.0 * wave(index)).collect();
     let second = Volume::new("waves", volume.dims(), volume.spacing(), waves).unwrap();
     let mut channel = Channel::new(VolumeSource::Memory);
-    channel.transfer = scene.transfer.clone();
+    channel.transfer = scene.channels[0].transfer.clone();
     channel.transfer.color = Some(Ramp::new(vec![(0.0, DVec3::X), (200.0, DVec3::Y)]).unwrap());
-    scene.further = vec![channel];
+    scene.channels.push(channel);
     (Arc::new(Volume::clone(&volume).with_channels("test", vec![second]).unwrap()), scene)
 }
 
@@ -176,8 +176,8 @@ fn parts_of_the_nearest_surfaces_merge() {
             let mut scene = scene.clone();
             let nothing = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
             match number {
-                0 => scene.transfer.opacity = nothing,
-                _ => scene.further[0].transfer.opacity = nothing,
+                0 => scene.channels[0].transfer.opacity = nothing,
+                _ => scene.channels[1].transfer.opacity = nothing,
             }
             headless(Backend::Cpu).render_volume(Arc::clone(&volume), &scene).unwrap().image
         };
@@ -189,7 +189,7 @@ fn parts_of_the_nearest_surfaces_merge() {
             compare(Backend::Gpu, &volume, &scene);
         }
         let drawn = parts(headless(Backend::Cpu), &volume, &scene, 2);
-        assert!(drawn.iter().all(|part| (part.identity.images, part.further.len()) == (1, 0)));
+        assert!(drawn.iter().all(|part| (part.identity.images, part.contents.len()) == (1, 1)));
     }
 }
 
@@ -209,12 +209,12 @@ fn parts_of_images_that_add_up_merge() {
             compare(backend, &volume, &scene);
         }
         let drawn = parts(headless(Backend::Cpu), &volume, &scene, 2);
-        assert!(drawn.iter().all(|part| (part.identity.images, part.further.len()) == (2, 1)));
+        assert!(drawn.iter().all(|part| (part.identity.images, part.contents.len()) == (2, 2)));
         let counts = |content: &Content| {
             let has_points = content.extremes.iter().any(|extreme| extreme.counted >= Extreme::POINT);
             has_points || content.extremes.is_empty() && content.colors.iter().any(|color| color[3] > 0.0)
         };
-        assert!(drawn.iter().any(|part| counts(&part.content) && counts(&part.further[0])), "{compositing:?}");
+        assert!(drawn.iter().any(|part| part.contents.iter().all(counts)), "{compositing:?}");
         // In files, too.
         let folder = tempfile::tempdir().unwrap();
         let reopened = ["part.exr", "part.npz"].map(|name| {
@@ -223,10 +223,10 @@ fn parts_of_images_that_add_up_merge() {
         });
         assert!(reopened.iter().all(|part| *part == drawn[0]));
         // A channel without opacity changes nothing.
-        scene.further[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
+        scene.channels[1].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
         compare(Backend::Cpu, &volume, &scene);
         let mut short = parts(headless(Backend::Cpu), &volume, &scene, 2);
-        short[1].further.clear();
+        short[1].contents.truncate(1);
         let message = Image::merge(short).unwrap_err().to_string();
         assert!(message.contains("images of channels: found 1, allowed: 2"), "{message}");
         // A view of another backend is refused, as it is elsewhere.
@@ -262,7 +262,7 @@ fn parts_choose_among_equal_sheets_as_the_whole_does() {
     for compositing in [Compositing::Maximum, Compositing::Minimum] {
         for (volume, mut scene) in scenes(compositing, Classification::Before, 40) {
             let opacity = if compositing == Compositing::Minimum { [0.6, 0.3] } else { [0.0, 0.6] };
-            scene.transfer.opacity = Some(Ramp::new(vec![(30.0, opacity[0]), (50.0, opacity[1])]).unwrap());
+            scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(30.0, opacity[0]), (50.0, opacity[1])]).unwrap());
             // Along an axis every slab holds the same sections.
             scene.camera.direction = DVec3::Y;
             compare(Backend::Cpu, &volume, &scene);
@@ -366,7 +366,7 @@ fn pairs_are_joined() {
             assert_eq!(front.window.slabs.end, region[1].window.slabs.end);
             joined.push(Part::join([Part::join([front, Part::join([c, d]).unwrap()]).unwrap(), e]).unwrap());
             // All at once they are the same.
-            assert_eq!(joined.last().unwrap().content, Part::join(region.to_vec()).unwrap().content);
+            assert_eq!(joined.last().unwrap().contents, Part::join(region.to_vec()).unwrap().contents);
         }
         assert_eq!(Image::merge(joined).unwrap().pixels, at_once.pixels, "{compositing:?}");
         if compositing == Compositing::Linear {

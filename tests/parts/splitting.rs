@@ -56,7 +56,7 @@ fn an_empty_view_has_parts() {
 fn windows_have_equal_work() {
     let (volume, mut scene) = head(64, [128, 128]);
     // Air takes no part.
-    scene.transfer.iso_ranges = Some(vec![[30.0, 255.0]]);
+    scene.channels[0].transfer.iso_ranges = Some(vec![[30.0, 255.0]]);
     scene.splatting.culling = false;
     let headless = headless(Backend::Cpu);
     let mut view = headless.view(Arc::clone(&volume), &scene).unwrap();

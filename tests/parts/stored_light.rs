@@ -88,7 +88,7 @@ fn light_of_another_scene_is_refused() {
     refused(&|scene| scene.shading.light = Light::UpperLeft, "light: shadow.to_light: found [");
     refused(&|scene| scene.splatting.radius = 1.75, "light: shadow.kernel: found [2.0, 2.0], allowed: [1.75, 2.0]");
     refused(&|scene| scene.camera.up = DVec3::new(0.1, 0.0, 1.0), "light: shadow.up: found [0.0, 0.0, 1.0]");
-    refused(&|scene| scene.transfer.iso_ranges = Some(vec![[50.0, 200.0]]), "light: matter: found ");
+    refused(&|scene| scene.channels[0].transfer.iso_ranges = Some(vec![[50.0, 200.0]]), "light: matter: found ");
     refused(&|scene| scene.clip.planes = vec![[1.0, 0.0, 0.0, 3.0]], "light: matter: found ");
     // Neither the camera nor shading decides.
     let mut other = scene.clone();

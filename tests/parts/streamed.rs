@@ -242,7 +242,7 @@ fn pages_hold_what_values_are() {
         let sets = [format!(
             "transfer={{color=[[{low},[0.3,0.5,0.9]],[{high},[1,0.8,0.4]]],opacity=[[{low},0],[{high},0.5]]}}"
         )];
-        let scene = Scene { transfer: super::streamed::head(64, &[&sets[0]]).1.transfer, ..scene.clone() };
+        let scene = scene.clone().with_transfer(super::streamed::head(64, &[&sets[0]]).1.channels[0].transfer.clone());
         let headless = headless(Backend::Gpu);
         let whole = headless.render_volume(volume.clone(), &scene).unwrap().image;
         let store = MemoryStore { sample_type: Some(sample_type), ..MemoryStore::new(&volume, UVec3::splat(16)) };
@@ -274,7 +274,7 @@ fn what_boxes_in_front_hide_is_not_drawn() {
             let sample = if has_labels { &labelled } else { &volume };
             let mut streamed = streamed(sample, MemoryStore::new(&volume, UVec3::splat(12)), 1 << 20);
             let labels = || StreamedLevel::new("labels", Arc::new(MemoryStore::new(&labels, UVec3::splat(12))), 0);
-            streamed.first.labels = has_labels.then(labels);
+            streamed.channels[0].labels = has_labels.then(labels);
             headless(backend).render_volume(streamed, &scene).unwrap()
         });
         let [fewer, sections] = [&hidden, &all].map(|drawn| drawn.stats.counts.sections_rasterized);

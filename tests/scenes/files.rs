@@ -35,7 +35,7 @@ fn a_key_chooses_a_series() {
     let dims = |series: &str| {
         let scene = Scene::from_volume(source(), &[format!("volume.series={series}")]).unwrap();
         let saved = Scene::parse(&scene.to_toml(Path::new("")).unwrap(), "scene.toml", Path::new(""), &[]).unwrap();
-        assert_eq!(saved.series, scene.series);
+        assert_eq!(saved.channels[0].series, scene.channels[0].series);
         saved.load_volume().map(|volume| volume.dims().to_array())
     };
     assert_eq!(

@@ -17,7 +17,7 @@ fn addresses_are_no_paths() {
         "[volume]\npath = \"{address}\"\nindex = 0\nspacing = [1, 1, 1]\nlabels = \"{address}/labels/cells\"\n"
     );
     let scene = Scene::parse(&text, "a", folder.path(), &[]).unwrap();
-    assert_eq!(scene.volume, VolumeSource::File(PathBuf::from(&address)));
+    assert_eq!(scene.channels[0].volume, VolumeSource::File(PathBuf::from(&address)));
     let volume = scene.load_volume().unwrap();
     assert_eq!((volume.values(), volume.labels().is_some()), ((&values()).into(), true));
     let written = scene.to_toml(folder.path()).unwrap();

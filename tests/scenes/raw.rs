@@ -45,7 +45,7 @@ fn every_type_both_byte_orders() {
             let keys = format!("path = 'a.raw', dims = [1, 3, 1], type = '{name}', endian = '{endian}'");
             let scene = Scene::parse(&format!("volume = {{{keys}}}"), "scene.toml", folder, &[]).unwrap();
             let layout = RawLayout { dims: UVec3::new(1, 3, 1), sample_type, big_endian, offset: 0 };
-            assert_eq!(scene.volume, VolumeSource::Raw(folder.join("a.raw"), layout));
+            assert_eq!(scene.channels[0].volume, VolumeSource::Raw(folder.join("a.raw"), layout));
         }
     }
 }
@@ -79,5 +79,5 @@ fn wrong_keys() {
     let text = format!("[volume]\npath = 'a.raw'\n{KEYS}");
     let sets = ["volume.builtin=cube".to_owned()];
     let scene = Scene::parse(&text, "", Path::new(""), &sets).unwrap();
-    assert_eq!(scene.volume, VolumeSource::Builtin("cube".to_owned()));
+    assert_eq!(scene.channels[0].volume, VolumeSource::Builtin("cube".to_owned()));
 }

@@ -67,13 +67,13 @@ impl<'a> Facts<'a> {
     pub(crate) fn new(volume: &Volume, scene: &Scene, histograms: &'a [Histogram]) -> Self {
         // A hidden channel keeps its colours and opacities.
         let mut seen = scene.clone();
-        seen.visible = true;
-        seen.further.iter_mut().for_each(|channel| channel.visible = true);
+        seen.channels.iter_mut().for_each(|channel| channel.visible = true);
         let transfer = seen.resolve(volume);
-        let channels = histograms.iter().zip(transfer.channels()).enumerate();
-        let preset = scene.transfer.preset;
+        let channels = histograms.iter().zip(&transfer).enumerate();
+        let preset = scene.channels.first().transfer.preset;
         let fitted = scene.fitted(volume);
-        let of_preset = fitted.transfer.preset.map_or(Splatting::default().compositing, Preset::compositing);
+        let of_preset =
+            fitted.channels.first().transfer.preset.map_or(Splatting::default().compositing, Preset::compositing);
         Self {
             dims: volume.dims().to_array(),
             spacing: volume.spacing().to_array(),
@@ -105,7 +105,7 @@ impl<'a> Facts<'a> {
 impl<'a> Channel<'a> {
     fn new(scene: &Scene, number: usize, name: String, histogram: &'a Histogram, transfer: &TransferFunction) -> Self {
         // A scene with settings for one channel shows all by them.
-        let settings = scene.channels().nth(if scene.further.is_empty() { 0 } else { number });
+        let settings = scene.channels.get(if scene.channels.len() == 1 { 0 } else { number });
         let stated = settings.as_ref().map(|settings| &settings.transfer);
         let color = |&(value, color): &(f64, DVec3)| (value, color.to_array());
         Self {
@@ -166,17 +166,7 @@ fn projection_name(camera: &Camera) -> &'static str {
 }
 
 fn compositing_name(compositing: Compositing) -> &'static str {
-    match compositing {
-        Compositing::Linear => "linear",
-        Compositing::Exponential => "exponential",
-        Compositing::Xray => "xray",
-        Compositing::Maximum => "maximum",
-        Compositing::Minimum => "minimum",
-        Compositing::Average => "average",
-        Compositing::Surface => "surface",
-        // One that this file does not know yet; the page shows it as the preset's.
-        _ => "",
-    }
+    name_of(&Compositing::ALL, compositing).unwrap_or_default()
 }
 
 fn name_of<T: PartialEq>(names: &[(&'static str, T)], wanted: T) -> Option<&'static str> {

@@ -218,7 +218,7 @@ impl Session {
     ) -> Result<(), JsValue> {
         let [width, height] = self.size;
         let scene = Scene { image: ImageSettings { width, height, ..scene.image }, ..scene };
-        scene.check().map_err(error)?;
+        scene.check_for(&volume).map_err(error)?;
         let (camera, home, object) = kept.unwrap_or_else(|| {
             let object = self.all_around.then(|| scene.sphere(&volume, &scene.resolve(&volume))).flatten();
             let camera = scene.camera_for(&volume);
@@ -282,14 +282,14 @@ impl Picked {
 
 /// What decides which volume a scene shows: its channels' volumes with their numbers, without those that are channels of the first one's volume.
 fn sources(scene: &Scene) -> Vec<(usize, Channel)> {
-    let source = |(number, channel): (usize, std::borrow::Cow<'_, Channel>)| {
-        let Channel { volume, spacing, labels, index, time, level, series, .. } = channel.into_owned();
+    let source = |(number, channel): (usize, &Channel)| {
+        let Channel { volume, spacing, labels, index, time, level, series, .. } = channel.clone();
         let mut source = Channel::new(volume);
         (source.spacing, source.labels) = (spacing, labels);
         (source.index, source.time, source.level, source.series) = (index, time, level, series);
         (number == 0 || source.volume != VolumeSource::Memory).then_some((number, source))
     };
-    scene.channels().enumerate().filter_map(source).collect()
+    scene.channels.iter().enumerate().filter_map(source).collect()
 }
 
 /// Plain data as a JavaScript object.

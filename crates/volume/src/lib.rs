@@ -103,6 +103,7 @@ mod zip;
 
 pub use access::ReadOptions;
 pub use adapted::ChunkProgress;
+pub use channels::Channels;
 pub use counts::StoreCounts;
 pub use display::ChannelDisplay;
 pub use encoding::Encoding;

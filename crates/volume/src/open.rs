@@ -72,9 +72,9 @@ impl Volume {
         }
         // All channels' values, one after the other.
         let voxels = dims.element_product() as usize;
-        let mut further = Vec::new();
+        let mut others = Vec::new();
         while values.as_slice().len() > voxels {
-            further.push(values.split_off(values.as_slice().len() - voxels));
+            others.push(values.split_off(values.as_slice().len() - voxels));
         }
         values.shrink_to_fit();
         let mut channel = |values: Values| {
@@ -87,13 +87,13 @@ impl Volume {
                 None => rounding.warn(path, sample_type, first.values()),
             }
         }
-        let further = further.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
+        let others = others.into_iter().rev().map(channel).collect::<Result<_, VolumeError>>()?;
         if let Some(Levels { dims, level, grid, reads }) = levels {
             let grid = access.spacing().map_or(grid, |spacing| grid.with_finest_spacing(spacing));
             grid.check().map_err(|error| refused(&origin, error))?;
             (first.grid, first.levels, first.level, first.reads) = (grid, dims, level, Some(reads));
         }
-        Ok(first.with_channels(&origin, further)?.right_handed(is_left_handed))
+        Ok(first.with_channels(&origin, others)?.right_handed(is_left_handed))
     }
 }
 

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::{DVec3, UVec3};
 
 use super::adapted::{AdaptedStore, Tally};
+use super::channels::Channels;
 use super::labels::labels_of;
 use super::resample::{Oriented, is_same_grid};
 use super::sample::{Chunks, parts_of, sample_at, some, spread};
@@ -15,10 +16,8 @@ use crate::StoreCounts;
 /// A volume that is drawn without being in memory as a whole (SPEC §13): one channel or several on one grid, each with labels or without.
 #[derive(Clone, Debug)]
 pub struct StreamedVolume {
-    /// The first channel, whose grid is that of all.
-    pub first: StreamedChannel,
-    /// The channels after the first (SPEC §10).
-    pub further: Vec<StreamedChannel>,
+    /// The channels (SPEC §10), all on the first one's grid.
+    pub channels: Channels<StreamedChannel>,
     /// Values by which everything is chosen that scenes leave open, such as the transfer function and the camera's frame: a coarser level, or a subset of the
     /// voxels, with the same box, and with all channels and labels.
     pub sample: Arc<Volume>,
@@ -144,20 +143,17 @@ impl StreamedVolume {
     /// # Errors
     /// If the store has no such level, cannot be read, or holds no finite value in the sample.
     pub fn new(origin: &str, store: Arc<dyn Store>, level: usize, memory: u64) -> Result<Self, VolumeError> {
-        Self::of_channels(StreamedLevel::new(origin, store, level).into(), Vec::new(), memory)
+        Self::of_channels(StreamedChannel::from(StreamedLevel::new(origin, store, level)), memory)
     }
 
     /// As [`Self::new`], of several channels and labels, which all lie on the grid of the first channel's level. The memory is for all of them together.
     ///
     /// # Errors
     /// As for [`Self::new`], if a level lies on another grid, or if a value of labels in the sample is no label.
-    pub fn of_channels(
-        first: StreamedChannel,
-        further: Vec<StreamedChannel>,
-        memory: u64,
-    ) -> Result<Self, VolumeError> {
-        let sample = sample_of_channels((&first, &further), memory / 8)?.sampling(*first.values.grid());
-        Ok(Self { first, further, sample: Arc::new(sample), memory: memory / 2 })
+    pub fn of_channels(channels: impl Into<Channels<StreamedChannel>>, memory: u64) -> Result<Self, VolumeError> {
+        let channels = channels.into();
+        let sample = sample_of_channels(&channels, memory / 8)?.sampling(*channels.first().values.grid());
+        Ok(Self { channels, sample: Arc::new(sample), memory: memory / 2 })
     }
 
     /// The same volume, none of whose chunks is read that an index tells to show nothing: chunks of the channel whose store the index is of. `origin` names the
@@ -166,19 +162,16 @@ impl StreamedVolume {
     /// # Errors
     /// If the index is of none of the channels' stores.
     pub fn with_index(mut self, index: StoreIndex, origin: &str) -> Result<Self, VolumeError> {
-        Self::index((&mut self.first, &mut self.further), index, origin)?;
+        Self::index(&mut self.channels, index, origin)?;
         Ok(self)
     }
 
     /// As [`Self::with_index`], before the sample is read.
     #[doc(hidden)]
-    pub fn index(
-        (first, further): (&mut StreamedChannel, &mut [StreamedChannel]),
-        index: StoreIndex,
-        origin: &str,
-    ) -> Result<(), VolumeError> {
-        let of_index = further.iter_mut().find(|channel| index.is_of(&*channel.values.store));
-        let StreamedChannel { values, .. } = of_index.unwrap_or(first);
+    pub fn index(channels: &mut Channels<StreamedChannel>, index: StoreIndex, origin: &str) -> Result<(), VolumeError> {
+        // An index of none is refused by the first one.
+        let number = channels.iter().position(|channel| index.is_of(&*channel.values.store)).unwrap_or(0);
+        let StreamedChannel { values, .. } = &mut channels[number];
         values.store = Arc::new(IndexedStore::new(Arc::clone(&values.store), index, origin)?);
         Ok(())
     }
@@ -187,15 +180,10 @@ impl StreamedVolume {
     /// once.
     pub fn watched_by(mut self, progress: Arc<ChunkProgress>) -> Self {
         let tally = Arc::new(Tally::new(self.chunks(), progress));
-        for of in std::iter::once(&mut self.first).chain(&mut self.further).flat_map(StreamedChannel::levels_mut) {
+        for of in self.channels.iter_mut().flat_map(StreamedChannel::levels_mut) {
             of.store = Arc::new(AdaptedStore::watched(Arc::clone(&of.store), of.level, &tally));
         }
         self
-    }
-
-    /// All channels.
-    pub fn channels(&self) -> impl Iterator<Item = &StreamedChannel> {
-        std::iter::once(&self.first).chain(&self.further)
     }
 
     /// A channel by itself, given by its number.
@@ -204,25 +192,22 @@ impl StreamedVolume {
     /// If there is no such channel.
     #[doc(hidden)]
     pub fn of_channel(&self, number: usize) -> Self {
-        let at = number.checked_sub(1);
-        let first = at.map_or(&self.first, |at| &self.further[at]).clone();
-        let sample = at.map_or(&self.sample, |at| &self.sample.further[at]);
-        let sample = sample.alone().sampling(*self.grid());
-        Self { first, further: Vec::new(), sample: Arc::new(sample), memory: self.memory }
+        let sample = self.sample.channel(number).unwrap_or(&self.sample).alone().sampling(*self.grid());
+        Self { channels: self.channels[number].clone().into(), sample: Arc::new(sample), memory: self.memory }
     }
 
     /// The values of the only channel, if there are no others, no labels and no colours.
     #[doc(hidden)]
     pub fn only_values(&self) -> Option<&StreamedLevel> {
-        let StreamedChannel { values, labels } = &self.first;
-        (self.further.is_empty() && labels.is_none() && !values.store.has_colors()).then_some(values)
+        let [StreamedChannel { values, labels: None }] = &*self.channels else { return None };
+        (!values.store.has_colors()).then_some(values)
     }
 
     /// The number of chunks of all channels and labels.
     #[doc(hidden)]
     pub fn chunks(&self) -> u64 {
         let chunks = |of: &StreamedLevel| of.store.levels()[of.level].chunks().as_u64vec3().element_product();
-        self.channels().flat_map(StreamedChannel::levels).map(chunks).sum()
+        self.channels.iter().flat_map(StreamedChannel::levels).map(chunks).sum()
     }
 
     /// The counts of a frame with those of reading the sample.
@@ -236,7 +221,7 @@ impl StreamedVolume {
     /// leaves no more.
     #[doc(hidden)]
     pub fn thinned(&self, most: u64) -> Thinned {
-        let common = common_levels((&self.first, &self.further));
+        let common = common_levels(&self.channels);
         let voxels = |grid: &Grid, stride: u32| grid.resized(grid.dims.map(|count| count.div_ceil(stride))).voxels();
         // The level that is drawn is among them.
         let chosen = common.iter().find(|(_, grid)| voxels(grid, 1) <= most).or(common.last());
@@ -252,20 +237,20 @@ impl StreamedVolume {
     /// If a store cannot be read, or a value of labels is no label.
     #[doc(hidden)]
     pub fn read_thinned(&self, Thinned { level, stride, .. }: Thinned) -> Result<Volume, VolumeError> {
-        let grid = self.first.values.store.levels()[level].grid;
-        read_every((&self.first, &self.further), (&grid, stride), Chunks::All)
+        let grid = self.channels.first().values.store.levels()[level].grid;
+        read_every(&self.channels, (&grid, stride), Chunks::All)
     }
 
     /// The number of the first channel's level that is drawn.
     #[doc(hidden)]
     pub fn level(&self) -> usize {
-        self.first.values.level
+        self.channels.first().values.level
     }
 
     /// The grid of the level that is drawn.
     #[doc(hidden)]
     pub fn grid(&self) -> &Grid {
-        self.first.values.grid()
+        self.channels.first().values.grid()
     }
 }
 
@@ -273,13 +258,14 @@ impl StreamedVolume {
 ///
 /// # Errors
 /// If one does not.
-pub fn check_grids((first, further): (&StreamedChannel, &[StreamedChannel])) -> Result<(), VolumeError> {
+pub fn check_grids(channels: &Channels<StreamedChannel>) -> Result<(), VolumeError> {
     fn oriented<'a>(of: &'a StreamedLevel, facts: &'a super::StoreFacts) -> Oriented<'a> {
         (of.grid(), facts.orientation.as_ref())
     }
+    let first = channels.first();
     first.values.check()?;
     let facts = first.values.store.facts();
-    for (number, channel) in std::iter::once(first).chain(further).enumerate() {
+    for (number, channel) in channels.iter().enumerate() {
         channel.values.check()?;
         let own = channel.values.store.facts();
         if !is_same_grid(oriented(&first.values, &facts), oriented(&channel.values, &own)) {
@@ -309,33 +295,21 @@ fn other_grid(found: &StreamedLevel, key: &str, name: &str, of: &StreamedChannel
 ///
 /// # Errors
 /// If a level lies on another grid than the first channel's, a store cannot be read or holds no finite value in the sample, or a value of labels is no label.
-pub fn sample_of_channels(
-    (first, further): (&StreamedChannel, &[StreamedChannel]),
-    memory: u64,
-) -> Result<Volume, VolumeError> {
-    check_grids((first, further))?;
-    let common = common_levels((first, further));
-    let parts: u64 =
-        channels_of((first, further)).flat_map(StreamedChannel::levels).map(|of| parts_of(&*of.store)).sum();
+pub fn sample_of_channels(channels: &Channels<StreamedChannel>, memory: u64) -> Result<Volume, VolumeError> {
+    check_grids(channels)?;
+    let common = common_levels(channels);
+    let parts: u64 = channels.iter().flat_map(StreamedChannel::levels).map(|of| parts_of(&*of.store)).sum();
     let grids: Vec<Grid> = common.iter().map(|&(_, grid)| grid).collect();
     let (number, step) = spread(&grids, memory / parts);
-    read_every((first, further), (&common[number].1, step), Chunks::Few)
-}
-
-/// All channels.
-fn channels_of<'a>(
-    (first, further): (&'a StreamedChannel, &'a [StreamedChannel]),
-) -> impl Iterator<Item = &'a StreamedChannel> {
-    std::iter::once(first).chain(further)
+    read_every(channels, (&common[number].1, step), Chunks::Few)
 }
 
 /// The levels that all channels and labels have, from the finest: their numbers in the first channel's store, and their grids. The levels that are drawn are
 /// among them.
-fn common_levels((first, further): (&StreamedChannel, &[StreamedChannel])) -> Vec<(usize, Grid)> {
-    let is_on_all = |grid: &Grid| {
-        channels_of((first, further)).flat_map(StreamedChannel::levels).all(|of| of.level_on(grid).is_some())
-    };
-    let levels = first.values.store.levels().iter().map(|level| level.grid).enumerate();
+fn common_levels(channels: &Channels<StreamedChannel>) -> Vec<(usize, Grid)> {
+    let is_on_all =
+        |grid: &Grid| channels.iter().flat_map(StreamedChannel::levels).all(|of| of.level_on(grid).is_some());
+    let levels = channels.first().values.store.levels().iter().map(|level| level.grid).enumerate();
     levels.filter(|(_, grid)| is_on_all(grid)).collect()
 }
 
@@ -344,7 +318,7 @@ fn common_levels((first, further): (&StreamedChannel, &[StreamedChannel])) -> Ve
 /// # Errors
 /// If a store cannot be read, or holds no finite value in chunks that stand for others, or a value of labels is no label.
 fn read_every(
-    (first, further): (&StreamedChannel, &[StreamedChannel]),
+    channels: &Channels<StreamedChannel>,
     (grid, step): (&Grid, u32),
     chunks: Chunks,
 ) -> Result<Volume, VolumeError> {
@@ -362,7 +336,7 @@ fn read_every(
         };
         Ok(sample)
     };
-    let mut sample = |channel: &StreamedChannel| {
+    let sample = |channel: &StreamedChannel| {
         let values = read(&channel.values)?;
         let Some(labels) = &channel.labels else { return Ok(values) };
         let own = read(labels)?;
@@ -374,9 +348,10 @@ fn read_every(
             names: labels.store.facts().label_names,
         })
     };
-    let volume = sample(first)?;
-    let further = further.iter().map(sample).collect::<Result<_, VolumeError>>()?;
-    Ok(Volume { reads: Some(reads), ..volume.with_channels(&first.values.origin, further)? })
+    let mut samples = channels.iter().map(sample).collect::<Result<Vec<_>, VolumeError>>()?;
+    let others = samples.split_off(1);
+    let first = samples.remove(0).with_channels(&channels.first().values.origin, others)?;
+    Ok(Volume { reads: Some(reads), ..first })
 }
 
 impl Volume {

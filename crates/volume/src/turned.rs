@@ -73,10 +73,10 @@ impl Volume {
         for_type!(Values, &mut self.values, values => turn(values, width));
         self.colors.as_mut().into_iter().for_each(|colors| turn(Arc::make_mut(colors), width));
         self.labels.as_mut().into_iter().for_each(|labels| turn(Arc::make_mut(labels), width));
-        let further = self.further.into_iter();
-        let further = further.map(|channel| Arc::new(Arc::unwrap_or_clone(channel).with_turned(turned))).collect();
+        let others = self.others.into_iter();
+        let others = others.map(|channel| Arc::new(Arc::unwrap_or_clone(channel).with_turned(turned))).collect();
         let (coefficients, membership) = (KeptCoefficients::default(), Default::default());
-        Self { grid: self.grid.turned(), further, coefficients, membership, ..self }
+        Self { grid: self.grid.turned(), others, coefficients, membership, ..self }
     }
 
     /// How the file's own axes lie in a patient, if known: as [`Self::orientation`], unless the first axis is turned.

@@ -26,8 +26,8 @@ use crate::for_type;
 ///
 /// World axes are the volume's axes and the origin is the volume's centre. World axes are right-handed: the first axis of a file whose axes are left-handed is
 /// turned ([`Grid::is_turned`]). Values are finite `f32`, except in holes (SPEC §3), where
-/// they are NaN. They are kept in the fewest bits that hold every one of them ([`Values`]). A segmented volume also has a label per voxel, and a volume of colours a colour ([`Self::from_colors`]). A volume may have further
-/// channels on the same grid ([`Self::further`]).
+/// they are NaN. They are kept in the fewest bits that hold every one of them ([`Values`]). A segmented volume also has a label per voxel, and a volume of colours a colour ([`Self::from_colors`]). A volume may have several
+/// channels on one grid ([`Self::channels`]); this one is then the first.
 #[derive(Clone, Debug)]
 pub struct Volume {
     pub(super) grid: Grid,
@@ -55,7 +55,8 @@ pub struct Volume {
     pub(super) display: Option<ChannelDisplay>,
     pub(super) time_names: Vec<String>,
     pub(super) series_names: Vec<String>,
-    pub(super) further: Vec<Arc<Volume>>,
+    /// The channels after this one, none of which has others.
+    pub(super) others: Vec<Arc<Volume>>,
     pub(super) levels: Vec<UVec3>,
     pub(super) level: u32,
     /// How much of a store was read; not part of the volume itself.
@@ -73,17 +74,17 @@ impl PartialEq for Volume {
     /// Two holes compare as equal.
     fn eq(&self, other: &Self) -> bool {
         let Self { grid, values, holes, labels, label_names, orientation, unit, encoding, palette, .. } = other;
-        let Self { colors, channel_name, value_unit, display, further, levels, level, .. } = other;
+        let Self { colors, channel_name, value_unit, display, others, levels, level, .. } = other;
         let facts = (grid, holes, labels, label_names, orientation, unit, encoding, palette);
         let of_labels = (&other.label_ids, &other.label_colors);
-        let channels = (colors, channel_name, value_unit, display, further, levels, level);
+        let channels = (colors, channel_name, value_unit, display, others, levels, level);
         let Self { grid, holes, labels, label_names, orientation, unit, encoding, palette, .. } = self;
         let own = (
             &self.colors,
             &self.channel_name,
             &self.value_unit,
             &self.display,
-            &self.further,
+            &self.others,
             &self.levels,
             &self.level,
         );
@@ -185,7 +186,7 @@ impl Volume {
             display: None,
             time_names: Vec::new(),
             series_names: Vec::new(),
-            further: Vec::new(),
+            others: Vec::new(),
             levels: Vec::new(),
             level: 0,
             reads: None,
@@ -208,7 +209,7 @@ impl Volume {
         };
         let mut channels = like.iter().map(channel);
         let first = channels.next().unwrap_or_else(|| Self::piece(grid, Values::default()));
-        Self { further: channels.map(Arc::new).collect(), ..first }
+        Self { others: channels.map(Arc::new).collect(), ..first }
     }
 
     /// The same values with another spacing (world units between neighbouring voxels; of a coarser level, those of the finest).
@@ -220,7 +221,7 @@ impl Volume {
         self.grid = self.grid.with_finest_spacing(spacing);
         self.is_spacing_assumed = false;
         self.grid.check().map_err(|error| refused(origin, error))?;
-        for channel in &mut self.further {
+        for channel in &mut self.others {
             Arc::make_mut(channel).grid = self.grid;
         }
         Ok(self)
@@ -351,7 +352,7 @@ impl Volume {
         self.encoding
     }
 
-    /// The coefficients that interpolate the values with a kernel of a radius and falloff, computed at the first request and kept for further
+    /// The coefficients that interpolate the values with a kernel of a radius and falloff, computed at the first request and kept for later
     /// ones with the same kernel.
     #[doc(hidden)]
     pub fn coefficients<E>(

@@ -235,7 +235,7 @@ impl Input {
         let scene = scene.map_err(|error| self.by_flag(&error))?;
         let unfit = [Preset::Xray, Preset::Labels, Preset::Photo];
         if let (Some([low, high]), Some(preset)) =
-            (self.look.window, scene.transfer.preset.filter(|of| unfit.contains(of)))
+            (self.look.window, scene.channels.first().transfer.preset.filter(|of| unfit.contains(of)))
         {
             let name = Preset::ALL.iter().find(|(_, of)| *of == preset).map_or("", |(name, _)| name);
             let allowed = "another preset, as this one's opacities are no window of values";
@@ -297,7 +297,7 @@ impl Input {
     pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
         let scene_file = self.is_scene_file().then(|| self.name.clone().into());
         let mut files: Vec<PathBuf> = scene_file.into_iter().chain(self.index.clone()).collect();
-        for channel in scene.channels() {
+        for channel in &scene.channels {
             files.extend(channel.volume.path().map(Path::to_path_buf));
             files.extend(channel.labels.clone());
         }
@@ -311,7 +311,7 @@ impl Input {
         explicit: impl Fn(&Scene, &Volume) -> Scene,
     ) -> Result<Scene, Failure> {
         let chosen = scene.choose_levels(&self.options(), explicit).map_err(|error| self.failure(error))?;
-        if let Some(level) = chosen.level.filter(|_| scene.level.is_none()) {
+        if let Some(level) = chosen.channels.first().level.filter(|_| scene.channels.first().level.is_none()) {
             log::info!("{}: level {level} is drawn", self.name);
         }
         Ok(chosen)

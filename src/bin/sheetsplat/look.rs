@@ -17,7 +17,9 @@ pub(crate) fn tell_choices(is_wanted: bool, name: &str, scene: &Scene, volume: &
         tell(is_wanted, &format!("{name}: {found}: drawn as amounts"));
     }
     let fitted = scene.fitted(volume);
-    if let Some(preset) = fitted.transfer.preset.filter(|_| scene.transfer.preset.is_none()) {
+    if let Some(preset) =
+        fitted.channels.first().transfer.preset.filter(|_| scene.channels.first().transfer.preset.is_none())
+    {
         let chosen = Preset::ALL.iter().find(|(_, of)| *of == preset).map_or("none", |(name, _)| name);
         let other = if preset == Preset::None { "" } else { " (--preset none: the surface that stands out)" };
         tell(is_wanted, &format!("{name}: preset {chosen}, as {}{other}", reason(preset, volume)));

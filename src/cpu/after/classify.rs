@@ -16,7 +16,6 @@ use crate::cpu::cut::TileRays;
 use crate::cpu::shade;
 use crate::cpu::sheets::{Buffers, CHANNELS, COLUMNS, ROWS};
 use crate::cpu::vector::{LANES, mask};
-use crate::settings::splatting::Compositing;
 
 /// The field of eight pixels in a slab.
 pub(super) struct Slab<S: Simd> {
@@ -107,7 +106,7 @@ impl Frame<'_> {
                     continue;
                 }
                 let Some(slab) = self.slab(simd, number, lanes, planes, [column, row]) else { continue };
-                if self.compositing == Compositing::Surface {
+                if self.compositing.has_surface() {
                     let found = self.find_surfaces(simd, &slab, looks, planes, [column, row], buffers);
                     open.close(row, found << column);
                     continue;
@@ -120,7 +119,7 @@ impl Frame<'_> {
                 }
             }
         }
-        if self.compositing == Compositing::Surface {
+        if self.compositing.has_surface() {
             open.join();
         }
     }
@@ -314,7 +313,7 @@ impl Frame<'_> {
         let ([least, greatest], low, high) = (self.integrals.shown, f0.min(f1), f0.max(f1));
         let is_at_end = high.simd_lt(splat(least + self.hair)) | low.simd_gt(splat(greatest - self.hair));
         let mut is_straight = is_at_end & amount.simd_lt(splat(slab_integral::MIN_BENT));
-        if self.compositing == Compositing::Surface {
+        if self.compositing.has_surface() {
             is_straight |= (amount * (high - low)).simd_lt(splat(slab_integral::SINGLE));
         }
         (f0 + f1) * 0.5 + is_straight.select(splat(0.0), bend)

@@ -22,7 +22,7 @@ use crate::lists::brick::{self, Brick, BrickList};
 use crate::lists::iso_range::ValueSet;
 use crate::scene::Scene;
 use crate::settings::shading::Gradient;
-use crate::settings::splatting::{Compositing, Splatting};
+use crate::settings::splatting::Splatting;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{ValueSlice, Volume};
 
@@ -213,7 +213,7 @@ impl Coefficients {
                 (shown, cells)
             })
         });
-        let extremes = matches!(compositing, Compositing::Maximum | Compositing::Minimum).then(|| {
+        let extremes = compositing.is_extreme().then(|| {
             old_extremes.unwrap_or_else(|| {
                 let reach = kernels.0.min(grid.dims.as_dvec3()).max(DVec3::ONE).as_uvec3();
                 BrickRanges::new(grid, self.all(volume), reach)

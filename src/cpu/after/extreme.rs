@@ -64,7 +64,7 @@ impl Chosen {
 
     /// The chosen values, row by row (SPEC §11), and in `pixels`, which are classified, the own colours of means, which are not.
     pub(super) fn extremes(&self, frame: &Frame<'_>, rays: &TileRays, pixels: &mut [[f32; 4]]) -> Vec<Extreme> {
-        let is_average = frame.compositing == Compositing::Average;
+        let is_average = frame.compositing.is_average();
         if is_average {
             for (at, pixel) in pixels.iter_mut().enumerate() {
                 let (row, column) = (at / COLUMNS, at % COLUMNS);
@@ -166,13 +166,13 @@ impl Frame<'_> {
         });
         let is_needed = (better | middles[0] | middles[1]).to_bitmask() as u32;
         let mut gradient = [f32x8::splat(simd, 0.0); 3];
-        if self.needs_gradients && self.compositing != Compositing::Average {
+        if self.needs_gradients && !self.compositing.is_average() {
             self.find_gradients(simd, plane, is_needed, [column, row]);
             let gradients = &plane.rows[row].gradients;
             let load = |axis: usize| f32x8::from_slice(simd, &gradients[axis][column..column + LANES]);
             gradient = [load(0), load(1), load(2)];
         }
-        let is_average = self.compositing == Compositing::Average;
+        let is_average = self.compositing.is_average();
         if let Some(kept) = chosen.colors.get_mut(row) {
             self.find_colors(
                 simd,
@@ -204,9 +204,9 @@ impl Frame<'_> {
     fn is_better<S: Simd>(&self, simd: S, kept: &Kept, column: usize, values: f32x8<S>) -> mask32x8<S> {
         let load = |row: &[f32; COLUMNS]| f32x8::from_slice(simd, &row[column..column + LANES]);
         let (number, weight) = (load(&kept.number), load(&kept.weight));
-        let is_better = match self.compositing {
-            Compositing::Minimum => values.simd_lt(number - self.hair),
-            _ => values.simd_gt(number + self.hair),
+        let is_better = match self.compositing.keeps_least() {
+            true => values.simd_lt(number - self.hair),
+            false => values.simd_gt(number + self.hair),
         };
         is_better | weight.simd_eq(f32x8::splat(simd, 0.0))
     }
@@ -247,7 +247,7 @@ impl Frame<'_> {
             let (first, second) = (has_near.select(near, far), has_far.select(far, near));
             has_best.select(load(of(best, at)), first + (second - first) * share)
         };
-        let is_average = self.compositing == Compositing::Average;
+        let is_average = self.compositing.is_average();
         let count = if is_average { load(&best.weight).max(splat(1.0)) } else { splat(1.0) };
         let numbers = (line(|kept, _| &kept.number, 0) / has_best.select(count, splat(1.0))).to_array();
         let gradient = [0, 1, 2].map(|axis| line(|kept, axis| &kept.gradient[axis], axis));

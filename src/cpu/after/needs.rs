@@ -11,7 +11,6 @@ use super::planes::Points;
 use super::tile::pixels_of;
 use crate::cpu::cull::{OpenMask, Pixels, columns_between};
 use crate::cpu::stream::Stream;
-use crate::settings::splatting::Compositing;
 
 /// Voxels around boxes for rounding in f32.
 const SLACK: f64 = 0.02;
@@ -70,8 +69,7 @@ impl<'a> Needs<'a> {
     /// Whether an open one of some pixels has a point on one of the planes whose value or gradient needs a voxel of a chunk.
     fn reaches(&self, (low, dims): (UVec3, UVec3), pixels: &Pixels) -> bool {
         let Self { frame, open, .. } = self;
-        let has_gradient =
-            frame.needs_gradients || frame.compositing == Compositing::Surface || frame.compositing.is_choice();
+        let has_gradient = frame.needs_gradients || frame.compositing.is_by_means();
         let all = frame.grid.dims.as_dvec3();
         let beyond = frame.placement.slab_step() + 0.5 + SLACK;
         self.planes.iter().flatten().any(|(points, low_pass)| {

@@ -20,7 +20,6 @@ use crate::cpu::count::bits;
 use crate::cpu::cull::OpenMask;
 use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::cpu::vector::LANES;
-use crate::settings::splatting::Compositing;
 
 /// Rounding errors of means, relative to the numbers' range, which is about 1.
 const SLACK: f32 = 3e-6;
@@ -312,13 +311,13 @@ impl Frame<'_> {
 
     /// 1, or of minima -1.
     fn sign(&self) -> f32 {
-        if self.compositing == Compositing::Minimum { -1.0 } else { 1.0 }
+        if self.compositing.keeps_least() { -1.0 } else { 1.0 }
     }
 
     /// The greatest number of values within a range, or of minima the negative of the least, rounded up.
     #[inline(always)]
     fn most(&self, [min, max]: [f32; 2]) -> f32 {
-        let extreme = if self.compositing == Compositing::Minimum { min } else { max };
+        let extreme = if self.compositing.keeps_least() { min } else { max };
         self.sign() * self.field.number(extreme) + SLACK
     }
 

@@ -10,7 +10,7 @@ use crate::after::normalization::Normalization;
 use crate::after::slab_integral::{self, CELL, HEAD, NODE, SUM};
 use crate::cpu::count::bits;
 use crate::cpu::vector::{LANES, columns, mask, optical_depth};
-use crate::settings::splatting::{Compositing, Splatting};
+use crate::settings::splatting::Splatting;
 use crate::settings::transfer_function::TransferFunction;
 
 /// One set of tables.
@@ -184,7 +184,7 @@ impl Integrals {
                 if table.covered.shown[1] > high { table.covered.shown[1] } else { high },
             ]
         });
-        Self { is_optical_depth: splatting.compositing == Compositing::Exponential, plain, labels, shown }
+        Self { is_optical_depth: splatting.compositing.is_optical_depth(), plain, labels, shown }
     }
 
     /// The table for the voxels of a label.

@@ -23,7 +23,6 @@ use crate::cpu::cut::TileRays;
 use crate::cpu::project::floor;
 use crate::cpu::sheets::{Buffers, COLUMNS, ROWS, Sheet};
 use crate::part::Extreme;
-use crate::settings::splatting::Compositing;
 
 /// The number of slabs before its first one in which a brick is read, so that it is in the cache when that slab comes.
 const AHEAD: i32 = 2;
@@ -250,7 +249,7 @@ impl<'a> TileWalk<'a> {
                 frame.classify(simd, slab, &looks, planes, &wanted, open, (sheets, buffers));
             }
         }
-        if frame.compositing.is_choice() || frame.compositing == Compositing::Surface {
+        if frame.compositing.is_by_means() {
             return;
         }
         if self.touched.contains(&slab) {

@@ -11,7 +11,6 @@ use crate::cpu::count::bits;
 use crate::cpu::sheets::{COLUMNS, ROWS};
 use crate::cpu::vector::LANES;
 use crate::parallel::prelude::*;
-use crate::settings::splatting::Compositing;
 
 /// Eight neighbouring pixels: the column and row of the first one in the tile, and a bit for each of them that is meant.
 type Eight = ([usize; 2], u32);
@@ -42,7 +41,7 @@ impl Frame<'_> {
             self.find_all_values(simd, plane, &eights);
         }
         // A surface needs the gradients of few pixels.
-        if !self.needs_gradients || self.compositing == Compositing::Surface {
+        if !self.needs_gradients || self.compositing.has_surface() {
             return;
         }
         let mut visible = [Vec::new(), Vec::new()];

@@ -144,7 +144,7 @@ fn bricks_of(source: &Source, splats: &Splats, number: u32, (volume, low): (&Vol
     let Splats { transfer, clipped, .. } = splats;
     let (from, dims) = source.bounds(number);
     let own = source.grid.resized(dims);
-    let taking_part = TakingPart::new(volume, transfer);
+    let taking_part = TakingPart::new(volume, std::slice::from_ref(transfer));
     let list = BrickList::by_rows(&own, &|y, z, flags: &mut [bool]| {
         let at = from + UVec3::new(0, y, z);
         let inside = clipped.in_row(at.y, at.z, from.x + dims.x);

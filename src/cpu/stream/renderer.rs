@@ -19,6 +19,7 @@ use crate::cpu::simd::{self, Simd};
 use crate::cpu::{check, statistics};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
+use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::kernel::Kernel;
@@ -31,7 +32,6 @@ use crate::scene::Scene;
 use crate::scene::open::CHUNKS_OF_THREAD;
 use crate::settings::camera::Camera;
 use crate::settings::splatting::Classification;
-use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::stats::{Stats, StoreCounts};
 use crate::volume::range::range_of;
@@ -52,8 +52,7 @@ pub struct StreamRenderer {
     volume: StreamedVolume,
     /// The volume's only values.
     values: StreamedLevel,
-    scene: Scene,
-    transfer: TransferFunction,
+    finished: FinishedScene,
     /// The minimum and maximum of the sample's values; `None` if all are holes.
     sampled: Option<[f32; 2]>,
     simd: Simd,
@@ -71,9 +70,9 @@ impl StreamRenderer {
     /// If the store has no such level, or its chunks are too many or too large; if the volume has labels, colours or several channels; or if a setting is not supported: exact interpolation, and methods other than image-aligned.
     pub fn new(volume: StreamedVolume, scene: &Scene) -> Result<Self, RenderError> {
         let Some(values) = volume.only_values().cloned() else {
-            let found = match (&volume.first, volume.further.is_empty()) {
-                (_, false) => "several channels",
-                (first, _) if first.labels.is_some() => "labels",
+            let found = match &*volume.channels {
+                [_, _, ..] => "several channels",
+                [only] if only.labels.is_some() => "labels",
                 _ => "colours",
             };
             let allowed =
@@ -87,10 +86,10 @@ impl StreamRenderer {
         }
         Source::check(&levels[values.level])?;
         let (simd, level) = simd::chosen()?;
-        let (scene, transfer) = settled(&volume, scene)?;
+        let finished = finished(&volume, scene)?;
         let sampled = range_of(volume.sample.values().iter());
         let (light, given) = (StreamedLight::default(), None);
-        Ok(Self { volume, values, scene, transfer, sampled, simd, level, light, given })
+        Ok(Self { volume, values, finished, sampled, simd, level, light, given })
     }
 
     /// Draws in light that is made elsewhere.
@@ -105,7 +104,7 @@ impl StreamRenderer {
 
     /// The settings.
     pub fn scene(&self) -> &Scene {
-        &self.scene
+        &self.finished.scene
     }
 
     /// Changes the scene, whose own volume is ignored.
@@ -113,7 +112,7 @@ impl StreamRenderer {
     /// # Errors
     /// As for [`Self::new`]; then nothing changes.
     pub fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        (self.scene, self.transfer) = settled(&self.volume, scene)?;
+        self.finished = finished(&self.volume, scene)?;
         Ok(())
     }
 
@@ -122,9 +121,7 @@ impl StreamRenderer {
     /// # Errors
     /// If a setting is not allowed; then nothing changes.
     pub fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
-        camera.check()?;
-        self.scene.camera = camera;
-        Ok(())
+        self.finished.set_camera(camera)
     }
 
     /// Draws a frame on the threads of the current rayon pool, or on fewer if memory holds chunks for fewer, while others read. Neither their number nor the memory changes a bit of the
@@ -134,7 +131,7 @@ impl StreamRenderer {
     /// If the store cannot be read, or the scene exceeds a limit, such as the number of slabs.
     pub fn draw(&self) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        let (scene, view) = self.view()?;
+        let (scene, view) = self.finished.framed(&self.volume.sample, self.volume.grid())?;
         let size = view.size;
         let window = Window { slabs: Window::ALL_SLABS, region: Region::whole(size) };
         let (content, stats) = self.drawing(&scene, (view, window, false), start)?;
@@ -148,20 +145,12 @@ impl StreamRenderer {
     /// As for [`Self::draw`], if the scene has no parts, or the window does not lie in the image.
     pub fn draw_part(&self, window: &Window) -> Result<(Part, Stats), RenderError> {
         let start = Instant::now();
-        part::check(&self.volume.sample, &self.scene, window)?;
-        let (scene, view) = self.view()?;
+        part::check(&self.volume.sample, self.scene(), window)?;
+        let (scene, view) = self.finished.framed(&self.volume.sample, self.volume.grid())?;
         let opened = window.opened(&view.slabs_of(self.volume.grid()));
         let (content, stats) = self.drawing(&scene, (view, opened, true), start)?;
-        let part = Part::new((&self.volume.clone().into(), &self.scene), &view, window, content)?;
+        let part = Part::new((&self.volume.clone().into(), self.scene()), &view, window, content)?;
         Ok((part, stats))
-    }
-
-    /// The scene with its frame, and its view.
-    fn view(&self) -> Result<(Scene, ViewGeometry), RenderError> {
-        let scene = self.scene.framed(&self.volume.sample, &self.transfer);
-        let size = [scene.image.width, scene.image.height];
-        let view = ViewGeometry::new(self.volume.grid(), &scene.camera, &scene.splatting, size)?;
-        Ok((scene, view))
     }
 
     /// Draws a window of the image, as pixels or as a part.
@@ -177,10 +166,10 @@ impl StreamRenderer {
         let lights = match self.given.clone() {
             // Given light has the sample's grid.
             Some(mut given) => {
-                let lights = given.lights((&self.volume.sample, &self.transfer), scene, &scene.camera)?;
+                let lights = given.lights((&self.volume.sample, &self.finished.transfer), scene, &scene.camera)?;
                 lights.map(|lights| Arc::new(lights.on(&grid)))
             }
-            None => self.light.lights((&self.volume, &self.transfer), scene)?,
+            None => self.light.lights((&self.volume, &self.finished.transfer), scene)?,
         };
         let host = Host { window, is_part, first_hit: None, surfaces: None, lights };
         let Drawing { content, counts, .. } = match scene.splatting.classification {
@@ -188,7 +177,7 @@ impl StreamRenderer {
                 let nothing = Volume::piece(grid.resized(UVec3::ZERO), Values::default());
                 let (numbers, is_range_known) = self.numbers();
                 let matter = Matter::Streamed { stream: &stream, nothing: &nothing, numbers, is_range_known };
-                let frame = after::Frame::new(0, (matter, &self.transfer), scene, view, host);
+                let frame = after::Frame::new(0, (matter, self.finished.transfer.first()), scene, view, host);
                 let threads = threads.min(self.holders(frame.held_bytes())?);
                 on_threads(threads, || after::Frame::draw(&[frame], self.level))?
             }
@@ -267,8 +256,8 @@ impl StreamRenderer {
                 side,
                 ranges: Ranges::new(StoreLevel { grid, chunk: side }.chunks().element_product()),
                 splats: (splatting.classification == Classification::Before).then(|| Splats {
-                    transfer: self.transfer.clone(),
-                    shown: ValueSet::of_tables(&self.transfer.tables(None)),
+                    transfer: self.finished.transfer.first().clone(),
+                    shown: ValueSet::of_tables(&self.finished.transfer.first().tables(None)),
                     clipped: scene.clip.voxels(&grid, splatting.radius),
                     projection: Projection::new(view, splatting.order, &slabs),
                     support: Kernel::new(splatting.radius, splatting.falloff).support(),
@@ -290,15 +279,8 @@ fn on_threads<R: Send>(threads: usize, draw: impl FnOnce() -> R + Send) -> Resul
     if threads >= current_num_threads() { Ok(draw()) } else { Ok(pool(threads)?.install(draw)) }
 }
 
-/// A scene for a volume's sample with its transfer function, once its classification is known.
-fn settled(volume: &StreamedVolume, scene: &Scene) -> Result<(Scene, TransferFunction), RenderError> {
-    let sample = &volume.sample;
-    scene.check()?;
-    scene.check_volume(sample)?;
-    check(scene)?;
-    scene.check_streamed(volume)?;
-    StreamedLight::check(volume, scene)?;
-    let settled = scene.settled(sample);
-    let transfer = settled.resolve(sample);
-    Ok((Scene { splatting: settled.splatting.streamed(), ..settled }, transfer))
+/// The scene that a volume is drawn in.
+fn finished(volume: &StreamedVolume, scene: &Scene) -> Result<FinishedScene, RenderError> {
+    let finished = FinishedScene::streamed(volume, scene)?;
+    check(scene).map(|()| finished)
 }

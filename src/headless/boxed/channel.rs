@@ -11,7 +11,7 @@ use crate::error::setting::SettingError;
 use crate::lists::iso_range::ValueSet;
 use crate::parallel::current_num_threads;
 use crate::parallel::prelude::*;
-use crate::settings::splatting::{Classification, Compositing, Splatting};
+use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::range::{EMPTY, finite_range, union};
 use crate::volume::{
@@ -57,7 +57,7 @@ pub(super) struct ChannelChunks<'a> {
     is_label_map: bool,
     /// Whether points between voxels have values between theirs.
     is_between: bool,
-    /// Whether values count that have no opacity ([`counts_all`]).
+    /// Whether values count that have no opacity.
     counts_all: bool,
     /// Whether chunks are no smaller than the distance at which values bear on what is seen, so that chunks tell what can be seen by their neighbours' values.
     is_told_by_chunks: bool,
@@ -80,7 +80,8 @@ impl<'a> ChannelChunks<'a> {
         let opaque = opaque_values(transfer);
         let is_told_by_chunks = reach.cmple(values.level.chunk).all();
         let is_between = splatting.classification == Classification::After;
-        let (is_label_map, counts_all) = (transfer.membership, counts_all(splatting));
+        let (is_label_map, counts_all) =
+            (transfer.membership, splatting.compositing.counts_all_values(splatting.classification));
         Ok(Self { number, values, labels, opaque, is_label_map, is_between, counts_all, is_told_by_chunks })
     }
 
@@ -215,15 +216,6 @@ impl<'a> ChannelChunks<'a> {
     /// Whether a value of a range, which may be empty, has an opacity.
     fn has_opaque(&self, [min, max]: [f32; 2]) -> bool {
         min <= max && self.opaque.meets(min, max)
-    }
-}
-
-/// Whether values without an opacity change pixels, because one value is chosen of all along a ray, or the least sheet, which may show nothing.
-fn counts_all(Splatting { compositing, classification, .. }: &Splatting) -> bool {
-    match compositing {
-        Compositing::Minimum => true,
-        Compositing::Maximum | Compositing::Average => *classification == Classification::After,
-        _ => false,
     }
 }
 

@@ -15,6 +15,7 @@ use crate::kernel::Kernel;
 use crate::part::{self, Content};
 use crate::scene::Scene;
 use crate::settings::splatting::Classification;
+use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::Region;
 use crate::stats::StoreCounts;
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
@@ -67,15 +68,15 @@ impl<'a> Chunks<'a> {
         let geometry = PlaneGeometry::new(view, volume.grid());
         let reach = if is_after { geometry.reach(view).along } else { UVec3::ZERO };
         let transfer = scene.resolve(&volume.sample);
-        let stores = volume.channels().map(|channel| 1 + u64::from(channel.labels.is_some())).sum::<u64>();
+        let stores = volume.channels.iter().map(|channel| 1 + u64::from(channel.labels.is_some())).sum::<u64>();
         let kept = volume.memory / SHARE / stores;
-        let channels = volume.channels().zip(transfer.channels()).enumerate();
+        let channels = volume.channels.iter().zip(&transfer).enumerate();
         let channels = channels.map(|(number, (channel, transfer))| {
             ChannelChunks::new((number, channel), transfer, &scene.splatting, (reach, kept))
         });
         let channels = channels.collect::<Result<Vec<_>, _>>()?;
         let channels = channels.into_iter().filter(ChannelChunks::has_opacity).collect();
-        let of_gradients = if transfer.has_membership() { MEMBERSHIP_REACH } else { 1 };
+        let of_gradients = if transfer.iter().any(TransferFunction::has_membership) { MEMBERSHIP_REACH } else { 1 };
         let (half_box, rim) = (geometry.widest_half_box(view), RIM + f64::from(of_gradients));
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let footprints = (!is_after && view.perspective.is_some()).then(|| kernel.support());
@@ -203,7 +204,7 @@ impl<'a> Chunks<'a> {
             return Ok(None);
         }
         let first = filled.remove(0);
-        Ok(Some((first.with_channels(&self.volume.first.values.origin, filled)?, numbers)))
+        Ok(Some((first.with_channels(&self.volume.channels.first().values.origin, filled)?, numbers)))
     }
 
     /// Notes the labels that decide which tables classify a region's means, of a volume of one channel.

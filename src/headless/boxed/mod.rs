@@ -25,6 +25,7 @@ use super::timed::milliseconds_since;
 use super::{Headless, joined};
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
+use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
 use crate::image::Image;
 use crate::light::StreamedLight;
@@ -32,11 +33,10 @@ use crate::part::{self, Content, Extreme, Identity, MergeError, Part};
 use crate::rendering::{Backend, Rendering};
 use crate::scene::Scene;
 use crate::settings::camera::Camera;
-use crate::settings::splatting::{Compositing, Order, Splatting};
 use crate::settings::window::{Region, Window};
 use crate::stats::{Counts, Stats};
+use crate::volume::StreamedVolume;
 use crate::volume::range::range_of;
-use crate::volume::{StreamedVolume, check_grids};
 pub(super) use channel::opaque_values;
 use source::{Needed, Source};
 
@@ -44,7 +44,7 @@ use source::{Needed, Source};
 #[derive(Clone, Debug)]
 pub(super) struct BoxedView {
     volume: StreamedVolume,
-    scene: Scene,
+    finished: FinishedScene,
     /// What draws the boxes.
     backend: Backend,
     light: StreamedLight,
@@ -56,10 +56,8 @@ impl BoxedView {
     /// # Errors
     /// If a setting of the scene is invalid, or not supported for a volume that is streamed.
     pub(super) fn new(volume: StreamedVolume, scene: &Scene, backend: Backend) -> Result<Self, RenderError> {
-        check(&volume, scene, backend)?;
-        let mut scene = scene.settled(&volume.sample);
-        scene.splatting = scene.splatting.streamed();
-        Ok(Self { volume, scene, backend, light: StreamedLight::default(), given: None })
+        let finished = finished(&volume, scene, backend)?;
+        Ok(Self { volume, finished, backend, light: StreamedLight::default(), given: None })
     }
 
     pub(super) fn backend(&self) -> Backend {
@@ -76,30 +74,25 @@ impl BoxedView {
     }
 
     pub(super) fn scene(&self) -> &Scene {
-        &self.scene
+        &self.finished.scene
     }
 
     pub(super) fn set_scene(&mut self, scene: &Scene) -> Result<(), RenderError> {
-        check(&self.volume, scene, self.backend)?;
-        self.scene = scene.settled(&self.volume.sample);
-        self.scene.splatting = self.scene.splatting.streamed();
+        self.finished = finished(&self.volume, scene, self.backend)?;
         Ok(())
     }
 
     pub(super) fn set_camera(&mut self, camera: Camera) -> Result<(), SettingError> {
-        camera.check()?;
-        self.scene.camera = camera;
-        Ok(())
+        self.finished.set_camera(camera)
     }
 
     /// Draws a frame.
     pub(super) fn draw(&self, headless: &Headless) -> Result<Rendering, RenderError> {
         let start = Instant::now();
-        if part::adds_up(&self.volume.sample, &self.scene) {
-            return joined::draw((&self.volume, &self.scene), self.given.as_ref(), headless);
+        if part::adds_up(&self.volume.sample, self.scene()) {
+            return joined::draw((&self.volume, self.scene()), self.given.as_ref(), headless);
         }
-        let size = [self.scene.image.width, self.scene.image.height];
-        let (parts, stats) = self.parts(&Window::whole(size), headless)?;
+        let (parts, stats) = self.parts(&Window::whole(self.finished.size()), headless)?;
         let image = Image::merge(parts).map_err(unmerged)?;
         Ok(Rendering { image, stats: Stats { frame_ms: milliseconds_since(start), ..stats } })
     }
@@ -114,11 +107,10 @@ impl BoxedView {
 
     /// The parts of a window, one for each region.
     fn parts(&self, window: &Window, headless: &Headless) -> Result<(Vec<Part>, Stats), RenderError> {
-        let Self { volume, scene, backend, .. } = self;
-        part::check(&volume.sample, scene, window)?;
-        let scene = scene.explicit(&volume.sample);
-        let view =
-            ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [scene.image.width, scene.image.height])?;
+        let Self { volume, finished, backend, .. } = self;
+        part::check(&volume.sample, self.scene(), window)?;
+        let scene = finished.scene.explicit(&volume.sample);
+        let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, finished.size())?;
         let mut walk = Walk {
             identity: Identity::of((&volume.clone().into(), &scene), &view)?,
             slabs: window.within(&view.slabs_of(volume.grid())),
@@ -129,7 +121,13 @@ impl BoxedView {
             },
             scene,
             headless,
-            range: volume.first.values.range().or_else(|| range_of(volume.sample.values().iter())).unwrap_or([0.0; 2]),
+            range: volume
+                .channels
+                .first()
+                .values
+                .range()
+                .or_else(|| range_of(volume.sample.values().iter()))
+                .unwrap_or([0.0; 2]),
             parts: Vec::new(),
             stats: Stats::default(),
         };
@@ -173,7 +171,7 @@ impl Walk<'_> {
         if self.identity.notes_labels() {
             self.source.chunks().note_labels(&self.scene, &region, &mut content)?;
         }
-        self.parts.push(Part::named(self.identity.clone(), Window { slabs, region }, vec![content]));
+        self.parts.push(Part::named(self.identity.clone(), Window { slabs, region }, content));
         Ok(())
     }
 
@@ -213,10 +211,10 @@ impl Walk<'_> {
         let closed = closed.filter(|closed| closed.contains(&true));
         let Some(content) = self.draw(needed, &window, closed.as_deref())? else { return Ok(None) };
         let part =
-            |slabs, content| Part::named(self.identity.clone(), Window { slabs, ..window.clone() }, vec![content]);
+            |slabs, content: Content| Part::named(self.identity.clone(), Window { slabs, ..window.clone() }, content);
         let start = window.slabs.start;
         let joined = Part::join([part(start - 1..start, front), part(window.slabs.clone(), content)]);
-        Ok(Some(joined.map_err(unmerged)?.content))
+        Ok(joined.map_err(unmerged)?.contents.into_iter().next())
     }
 
     /// Draws a window from the voxels that it needs.
@@ -232,7 +230,7 @@ impl Walk<'_> {
             return Ok(None);
         };
         // Means are noted as they are.
-        let is_choice = self.identity.has_extremes() && self.scene.splatting.compositing != Compositing::Average;
+        let is_choice = self.identity.has_extremes() && !self.scene.splatting.compositing.is_average();
         if let Some(range) = range.filter(|_| is_choice) {
             in_range(&mut content.extremes, range, self.range);
         }
@@ -245,13 +243,15 @@ impl Walk<'_> {
 
     /// For each pixel whether anything can be seen behind it; `None` if nothing hides what lies behind it.
     fn open_pixels(&self, content: &Content) -> Option<Vec<bool>> {
-        let opaque = opaque_from(&self.scene.splatting)?;
+        let opaque = self.scene.splatting.culls_from()? as f32;
         Some(content.colors.iter().map(|color| color[3] < opaque).collect())
     }
 
     /// The smallest box of a region's pixels behind which anything can be seen; `None` if there is no such pixel.
     fn open_box(&self, content: &Content, region: &Region) -> Option<Region> {
-        let Some(opaque) = opaque_from(&self.scene.splatting) else { return Some(*region) };
+        let Some(opaque) = self.scene.splatting.culls_from().map(|opacity| opacity as f32) else {
+            return Some(*region);
+        };
         let (mut low, mut high) = ([u32::MAX; 2], [0; 2]);
         for (color, at) in content.colors.iter().zip(0..).filter(|(color, _)| color[3] < opaque) {
             debug_assert!(color[3].is_finite());
@@ -265,13 +265,6 @@ impl Walk<'_> {
     }
 }
 
-/// The opacity from which nothing behind a pixel can be seen, if there is one.
-fn opaque_from(splatting: &Splatting) -> Option<f32> {
-    let Splatting { compositing, culling, order, opacity_threshold, .. } = *splatting;
-    let enough = if compositing == Compositing::Surface { 1.0 } else { opacity_threshold as f32 };
-    (compositing.hides() && culling && order == Order::FrontToBack).then_some(enough)
-}
-
 /// Converts values that pixels chose, places in the range of a box's values, into places in the range of all.
 fn in_range(extremes: &mut [Extreme], own: [f32; 2], all: [f32; 2]) {
     let span = |[low, high]: [f32; 2]| if high > low { f64::from(high) - f64::from(low) } else { 1.0 };
@@ -281,19 +274,15 @@ fn in_range(extremes: &mut [Extreme], own: [f32; 2], all: [f32; 2]) {
     }
 }
 
-/// Checks that a scene can be drawn box by box by a backend.
+/// The scene that a volume is drawn in box by box by a backend.
 #[cfg_attr(not(feature = "cpu"), expect(unused_variables, reason = "only the native backend refuses settings"))]
-fn check(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<(), RenderError> {
-    scene.check()?;
-    check_grids((&volume.first, &volume.further))?;
-    scene.check_volume(&volume.sample)?;
-    scene.check_streamed(volume)?;
-    StreamedLight::check(volume, scene)?;
+fn finished(volume: &StreamedVolume, scene: &Scene, backend: Backend) -> Result<FinishedScene, RenderError> {
+    let finished = FinishedScene::streamed(volume, scene)?;
     #[cfg(feature = "cpu")]
     if backend == Backend::Cpu {
         crate::cpu::check(scene)?;
     }
-    Ok(())
+    Ok(finished)
 }
 
 /// The squares of some side, or what is left of them, that cover a region.
@@ -318,11 +307,11 @@ fn side_by_side(parts: Vec<Part>, window: &Window) -> Result<Part, RenderError> 
         if identity.is_none() {
             content = Content::empty(region.pixels(), part.identity.has_extremes());
         }
-        put((&part.content, &part.window.region), (&mut content, region));
+        put((part.contents.first(), &part.window.region), (&mut content, region));
         identity = Some(part.identity);
     }
     let identity = identity.ok_or_else(|| RenderError::Readback("a window has no region".to_owned()))?;
-    Ok(Part::named(identity, window.clone(), vec![content]))
+    Ok(Part::named(identity, window.clone(), content))
 }
 
 /// The pixels of a region within another one.

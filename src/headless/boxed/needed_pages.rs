@@ -50,7 +50,7 @@ impl Needed {
 
 /// What the values of a channel are splatted as: scaled by the range that the store knows, or else that of its sample.
 pub(super) fn numbers_of(volume: &StreamedVolume, number: usize) -> Normalization {
-    let known = volume.channels().nth(number).and_then(|channel| channel.values.range());
+    let known = volume.channels.get(number).and_then(|channel| channel.values.range());
     let sample = || volume.sample.channel(number).and_then(|sample| range_of(sample.values().iter()));
     Normalization::new(known.or_else(sample).unwrap_or([0.0; 2]).map(f64::from))
 }
@@ -58,7 +58,7 @@ pub(super) fn numbers_of(volume: &StreamedVolume, number: usize) -> Normalizatio
 /// How values are stored at first: in as many bits as samples have in the file. Where they are not the samples, that may turn out to be too few. Where a channel's
 /// page is not needed for which another's is, it has holes, which only the bits of an `f32` can tell.
 pub(super) fn format_of(volume: &StreamedVolume) -> ValueFormat {
-    let encoding = volume.first.values.store.facts().encoding.filter(|_| volume.further.is_empty());
+    let encoding = volume.channels.first().values.store.facts().encoding.filter(|_| volume.channels.len() == 1);
     match encoding.map(|encoding| encoding.sample_type) {
         Some(SampleType::U8) => ValueFormat::Offset8(0.0),
         Some(SampleType::I8) => ValueFormat::Offset8(i8::MIN.into()),

@@ -104,7 +104,7 @@ impl<'a> Pages<'a> {
         view: &ViewGeometry,
     ) -> Result<Option<Self>, RenderError> {
         let transfer = scene.resolve(&volume.sample);
-        if transfer.has_membership() {
+        if transfer.iter().any(TransferFunction::has_membership) {
             return Ok(None);
         }
         let chunks = Chunks::new(volume, scene, view)?;
@@ -118,11 +118,11 @@ impl<'a> Pages<'a> {
         });
         let rim = match &needs {
             Some(needs) => needs.reach.along,
-            None => UVec3::splat(u32::from(transfer.channels().any(TransferFunction::is_by_gradient))),
+            None => UVec3::splat(u32::from(transfer.iter().any(TransferFunction::is_by_gradient))),
         };
         let hollow = chunks.channels().map(|channel| HollowChannel {
             labels: channel.levels().count() > 1,
-            colors: volume.channels().nth(channel.number).is_some_and(|of| of.values.store.has_colors()),
+            colors: volume.channels.get(channel.number).is_some_and(|of| of.values.store.has_colors()),
             holes: false,
         });
         let hollow: Vec<HollowChannel> = hollow.collect();

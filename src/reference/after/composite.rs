@@ -7,7 +7,7 @@ use glam::DVec4;
 use super::pixel::{Composited, Pixel, Slab};
 use super::{extreme, surface};
 use crate::reference::composite::composite_pixel;
-use crate::settings::splatting::{Compositing, Order};
+use crate::settings::splatting::Order;
 
 /// Compositing ends early when the pixel cannot change by more than this.
 const REST: f64 = 1e-12;
@@ -16,9 +16,9 @@ const REST: f64 = 1e-12;
 pub(super) fn composite(channels: &[Pixel]) -> Composited {
     let first = &channels[0];
     match first.frame.scene.splatting.compositing {
-        Compositing::Linear | Compositing::Exponential | Compositing::Xray => composite_sheets(channels),
-        Compositing::Surface => surface::composite(first),
-        Compositing::Maximum | Compositing::Minimum | Compositing::Average => extreme::composite(first),
+        compositing if compositing.has_surface() => surface::composite(first),
+        compositing if compositing.is_choice() => extreme::composite(first),
+        _ => composite_sheets(channels),
     }
 }
 

@@ -18,7 +18,7 @@ use crate::lists::quad_plan::tile_grid;
 use crate::parallel::prelude::*;
 use crate::reference::Host;
 use crate::scene::Scene;
-use crate::settings::splatting::{Classification, Compositing};
+use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::{Tables, TransferFunction};
 use crate::stats::Counts;
 use crate::volume::Volume;
@@ -44,7 +44,7 @@ struct Reach {
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
-pub fn count(volume: &Volume, transfer: &TransferFunction, scene: &Scene) -> Result<Counts, RenderError> {
+pub fn count(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Counts, RenderError> {
     // Counts do not depend on light.
     Ok(count_in(&Frame::of_channels(Host::default(), volume, transfer, (scene, Some(&Arc::default())))?))
 }
@@ -192,9 +192,9 @@ fn shows(frame: &Frame, tables: &[Tables], rows: impl Iterator<Item = Range<u32>
 fn bearing(frame: &Frame, [min, max]: [f64; 2]) -> [f64; 2] {
     let all = frame.field.range();
     match frame.scene.splatting.compositing {
-        Compositing::Maximum => [all[0], max],
-        Compositing::Minimum => [min, all[1]],
-        Compositing::Average => all,
+        compositing if compositing.is_average() => all,
+        compositing if compositing.keeps_least() => [min, all[1]],
+        compositing if compositing.is_extreme() => [all[0], max],
         _ => [min, max],
     }
 }

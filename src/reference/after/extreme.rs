@@ -4,7 +4,6 @@ use glam::{DVec3, DVec4};
 
 use super::pixel::{Composited, Pixel};
 use crate::part::Extreme;
-use crate::settings::splatting::Compositing;
 
 /// A position on a pixel's ray, with the field there.
 struct Point {
@@ -24,22 +23,19 @@ pub(super) fn composite(pixel: &Pixel) -> Composited {
     let compositing = scene.splatting.compositing;
     let chosen = match compositing {
         _ if stretch.is_empty() => None,
-        Compositing::Average => average(pixel),
-        _ => extreme(pixel, compositing == Compositing::Minimum),
+        _ if compositing.is_average() => average(pixel),
+        _ => extreme(pixel, compositing.keeps_least()),
     };
     let Some(Point { sheet, value, gradient, own, counted }) = chosen else {
         return Composited::new(DVec4::ZERO, None);
     };
     let [min, max] = pixel.frame().field.range();
     let share = if max > min { (value - min) / (max - min) } else { 0.0 };
-    let kept = if compositing == Compositing::Average { value } else { share };
-    let tables = match compositing {
-        Compositing::Average => pixel.middle_tables(),
-        _ => pixel.tables(sheet),
-    };
+    let kept = if compositing.is_average() { value } else { share };
+    let tables = if compositing.is_average() { pixel.middle_tables() } else { pixel.tables(sheet) };
     let base = own.map_or_else(|| tables.color.at(value), DVec4::truncate);
     let opacity = own.map_or(1.0, |own| own.w);
-    let color = if compositing == Compositing::Average {
+    let color = if compositing.is_average() {
         let alpha = if tables.visible && tables.in_iso_range(value) { tables.opacity.at(value) } else { 0.0 };
         base.extend(1.0) * alpha * opacity
     } else {

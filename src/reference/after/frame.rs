@@ -8,7 +8,9 @@ use glam::DVec3;
 use super::field::Field;
 use super::low_pass::LowPass;
 use crate::error::RenderError;
+use crate::error::setting::SettingError;
 use crate::lists::classify::channels;
+use crate::reference::framed;
 use crate::reference::{Geometry, Host, Lights};
 use crate::scene::Scene;
 use crate::settings::transfer_function::TransferFunction;
@@ -38,42 +40,28 @@ impl<'a> Frame<'a> {
     pub fn new(
         host: Host<'a>,
         volume: &'a Volume,
-        transfer: &'a TransferFunction,
+        transfer: &'a [TransferFunction],
         scene: &Scene,
     ) -> Result<Self, RenderError> {
-        Self::lit(host, volume, transfer, (scene, None))
+        let first = Self::of_channels(host, volume, transfer, (scene, None))?.into_iter().next();
+        Ok(first.ok_or_else(|| SettingError::new("channel", "none", "at least one"))?)
     }
 
-    /// [`Self::new`]; `lights` are those of all channels, where one of them is drawn by itself.
-    fn lit(
-        host: Host<'a>,
-        volume: &'a Volume,
-        transfer: &'a TransferFunction,
-        (scene, lights): (&Scene, Option<&Arc<Lights>>),
-    ) -> Result<Self, RenderError> {
-        scene.check()?;
-        transfer.check()?;
-        host.check(scene)?;
-        let scene = scene.framed(volume, transfer);
-        let lights = Lights::or_new(lights, volume, transfer, &scene)?;
-        Self::of_channel(host, volume, transfer, (scene, lights))
-    }
-
-    /// Those of all channels, which share everything that depends on the view.
+    /// Those of all channels, which share everything that depends on the view; `lights` are those of all channels, where one of them is drawn by itself.
     ///
     /// # Errors
     /// If the scene needs more than can be computed.
     pub fn of_channels(
         host: Host<'a>,
         volume: &'a Volume,
-        transfer: &'a TransferFunction,
+        transfer: &'a [TransferFunction],
         (scene, lights): (&Scene, Option<&Arc<Lights>>),
     ) -> Result<Vec<Self>, RenderError> {
-        let first = Self::lit(host, volume, transfer, (scene, lights))?;
-        let of = (first.scene.clone(), Arc::clone(&first.lights));
-        let further = channels(volume, transfer).skip(1);
-        let further = further.map(|(volume, transfer)| Self::of_channel(host, volume, transfer, of.clone()));
-        std::iter::once(Ok(first)).chain(further).collect()
+        let scene = framed(volume, transfer, scene)?;
+        host.check(&scene)?;
+        let of = (Lights::or_new(lights, volume, transfer, &scene)?, scene);
+        let frame = |(volume, transfer)| Self::of_channel(host, volume, transfer, (of.1.clone(), of.0.clone()));
+        channels(volume, transfer).map(frame).collect()
     }
 
     fn of_channel(

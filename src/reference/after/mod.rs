@@ -33,10 +33,11 @@ use glam::{DVec4, UVec2};
 use super::{Areas, Buffer, Culled, Host, Lights, resolve};
 use crate::error::RenderError;
 use crate::image::channels::Joining;
+use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::part::{Content, Extreme};
 use crate::scene::Scene;
-use crate::settings::splatting::Compositing;
+use crate::settings::splatting::Classification;
 use crate::settings::transfer_function::TransferFunction;
 use crate::settings::window::{Region, Window};
 use crate::volume::Volume;
@@ -91,7 +92,7 @@ fn each_place_in<T: Send>(region: &Region, of: impl Fn(UVec2) -> T + Sync) -> Ve
 /// The pixels of a window composited from all channels, row by row.
 fn composite_window(
     host: Host<'_>,
-    (volume, transfer): (&Volume, &TransferFunction),
+    (volume, transfer): (&Volume, &[TransferFunction]),
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     Window { slabs, region }: &Window,
 ) -> Result<Vec<Composited>, RenderError> {
@@ -103,7 +104,7 @@ fn composite_window(
 /// The pixels of a part that shows the nearest of the channels' surfaces (SPEC §10).
 pub(super) fn nearest_part(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     window: &Window,
 ) -> Result<Content, RenderError> {
@@ -112,8 +113,9 @@ pub(super) fn nearest_part(
     let lights = Lights::or_new(lights, volume, transfer, &scene)?;
     let host = Host { first_hit: Some(1.0), ..Host::default() };
     let (mut colors, mut hits) = (vec![[0.0; 4]; window.region.pixels()], vec![f64::INFINITY; window.region.pixels()]);
-    for (number, channel) in volume.channels().enumerate().take(1 + transfer.further.len()) {
-        let pixels = composite_window(host, (channel, &transfer.of_channel(number)), (&scene, Some(&lights)), window)?;
+    for (channel, transfer) in channels(volume, transfer) {
+        let pixels =
+            composite_window(host, (channel, std::slice::from_ref(transfer)), (&scene, Some(&lights)), window)?;
         let own = pixels.iter().map(|pixel| pixel.color.as_vec4().to_array()).collect::<Vec<_>>();
         let own_hits = pixels.iter().map(|pixel| pixel.first_hit.unwrap_or(f64::INFINITY)).collect::<Vec<_>>();
         Joining::Nearest.join((&mut colors, &mut hits), (&own, &own_hits));
@@ -125,49 +127,35 @@ pub(super) fn nearest_part(
 /// See [`super::part`].
 pub(super) fn part(
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
     window: &Window,
 ) -> Result<Content, RenderError> {
     let pixels = composite_window(Host::default(), (volume, transfer), (scene, lights), window)?;
     let compositing = scene.splatting.compositing;
-    let is_mean = |pixel: &Composited| compositing == Compositing::Average && pixel.extreme.counted > Extreme::MIDDLE;
+    let is_mean = |pixel: &Composited| compositing.is_average() && pixel.extreme.counted > Extreme::MIDDLE;
     // Means are classified where parts are merged.
     let color = |pixel: &Composited| if is_mean(pixel) { pixel.own.unwrap_or_default() } else { pixel.color };
     let colors = pixels.iter().map(|pixel| color(pixel).as_vec4().to_array()).collect();
-    let is_choice = matches!(compositing, Compositing::Maximum | Compositing::Minimum | Compositing::Average);
-    let extremes = pixels.iter().filter(|_| is_choice).map(|pixel| pixel.extreme).collect();
+    let extremes = pixels.iter().filter(|_| compositing.is_choice()).map(|pixel| pixel.extreme).collect();
     Ok(Content { colors, extremes })
 }
 
-/// Renders a scene as [`super::render_for`] does. Nothing is culled, and the order of compositing does not matter.
+/// Renders a scene as [`super::render_for`] does. Nothing is culled, and the order of compositing does not matter. `lights` are those of all channels, where one
+/// of them is drawn by itself.
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
-pub fn render_for(
-    host: Host<'_>,
-    volume: &Volume,
-    transfer: &TransferFunction,
-    scene: &Scene,
-) -> Result<Culled, RenderError> {
-    render_lit(host, volume, transfer, (scene, None))
-}
-
-/// [`render_for`]; `lights` are those of all channels, where one of them is drawn by itself.
 pub(super) fn render_lit(
     host: Host<'_>,
     volume: &Volume,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     (scene, lights): (&Scene, Option<&Arc<Lights>>),
 ) -> Result<Culled, RenderError> {
     let frames = Frame::of_channels(host, volume, transfer, (scene, lights))?;
     let pixels = composite(&frames, &Region::whole([scene.image.width, scene.image.height]));
     let acc = Buffer { width: scene.image.width as usize, pixels: pixels.iter().map(|pixel| pixel.color).collect() };
-    // Sums are clamped; the other modes already give premultiplied RGBA.
-    let resolved_as = match scene.splatting.compositing {
-        Compositing::Xray => Compositing::Xray,
-        _ => Compositing::Linear,
-    };
+    let resolved_as = scene.splatting.compositing.finished_as(Classification::After);
     let image = resolve::resolve(&acc, (resolved_as, &scene.splatting), scene.image.background).into_image();
     let depth = |(at, pixel): (usize, &Composited)| {
         let at = UVec2::new((at % acc.width) as u32, (at / acc.width) as u32);

@@ -99,7 +99,7 @@ pub fn knots(tables: &Tables, [f0, f1]: [f64; 2]) -> Vec<f64> {
 /// Splits a piece over which α is linear into pieces over which m is smooth enough for the quadrature.
 fn smooth_pieces(compositing: Compositing, start: f64, end: f64, alpha_start: f64, alpha_end: f64) -> Vec<(f64, f64)> {
     let mut cuts = vec![start];
-    if compositing == Compositing::Exponential && alpha_start != alpha_end {
+    if compositing.is_optical_depth() && alpha_start != alpha_end {
         // The transparencies 1 - α at both ends, the larger one first, and the ends' positions.
         let [larger, smaller] =
             [1.0 - alpha_start.min(alpha_end), (1.0 - alpha_start.max(alpha_end)).max(1.0 - MAX_ALPHA)];

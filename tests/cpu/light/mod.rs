@@ -16,7 +16,7 @@ use sheetsplat::volume::Volume;
 
 /// The light sheets of a scene that states its camera.
 fn lights(volume: &Volume, scene: &Scene) -> Arc<Lights> {
-    let transfer = scene.transfer.resolve(volume);
+    let transfer = [scene.channels[0].transfer.resolve(volume)];
     KeptLight::default().lights((volume, &transfer), scene, &scene.camera).unwrap().unwrap()
 }
 

@@ -33,7 +33,7 @@ fn two_channels(volume: &Volume, scene: &mut Scene) -> Volume {
     let mirrored = Volume::new("mirrored", volume.dims(), volume.spacing(), mirrored).unwrap();
     let mut channel = Channel::new(VolumeSource::Memory);
     channel.transfer = transfer(&[(0.0, [0.1, 0.9, 0.2])], &[(20.0, 0.0), (220.0, 0.8)]);
-    scene.further = vec![channel];
+    scene.channels.push(channel);
     volume.clone().with_channels("two", vec![mirrored]).unwrap()
 }
 
@@ -46,13 +46,13 @@ fn exact(volume: &Volume, scene: &Scene) -> Image {
 fn composited(compositing: Compositing, volume: &Volume, scene: &mut Scene) {
     scene.splatting.compositing = compositing;
     if compositing == Compositing::Surface {
-        scene.transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (80.0, 0.6), (200.0, 0.9)]).unwrap());
+        scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (80.0, 0.6), (200.0, 0.9)]).unwrap());
     }
     if compositing == Compositing::Minimum {
         let half = volume.grid().center() * volume.spacing();
         scene.camera.projection = Projection::Orthographic { height: Some(1.8 * half.z) };
         scene.clip.crop = Some([-0.45 * half, 0.4 * half]);
-        scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.9), (60.0, 0.8), (200.0, 0.1)]).unwrap());
+        scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.9), (60.0, 0.8), (200.0, 0.1)]).unwrap());
     }
 }
 
@@ -183,7 +183,7 @@ fn turning_light_does_not_pop() {
     let mut scene = scene(80, 80);
     scene.camera.direction = DVec3::new(0.5, 0.8, -0.4);
     scene.splatting.compositing = Compositing::Exponential;
-    scene.transfer = transfer(&[(0.0, [0.9, 0.8, 0.7])], &[(0.0, 0.0), (255.0, 0.6)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [0.9, 0.8, 0.7])], &[(0.0, 0.0), (255.0, 0.6)]);
     scene.shading = Shading { ambient: 0.3, diffuse: 0.7, shadow: 1.0, ..scene.shading };
     let mut renderer = CpuRenderer::new(volume, &scene).unwrap();
     let mut before: Option<Image> = None;

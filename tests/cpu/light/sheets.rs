@@ -20,10 +20,10 @@ fn case(random: &mut Random) -> (Volume, Scene) {
     let mut scene = scene(8, 8);
     (scene.camera.direction, scene.camera.up) = (random.direction(), random.direction());
     let solid = random.pick(&[0.02, 0.2, 0.9, 1.0]);
-    scene.transfer =
+    scene.channels[0].transfer =
         transfer(&[(0.0, [1.0; 3])], &[(5.0, 0.0), (20.0, random.pick(&[0.0, 0.01, 1.0])), (200.0, solid)]);
     if random.bits().is_multiple_of(3) {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (60.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (60.0, 1.0)]).unwrap());
     }
     if random.bits().is_multiple_of(3) {
         let normal = random.direction();
@@ -66,7 +66,7 @@ fn stacks_are_those_of_the_f64_evaluation() {
             (scene.camera.direction, scene.camera.up) = (up.any_orthogonal_vector(), up);
             scene.shading.light = Light::Direction(-up);
         }
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = [scene.channels[0].transfer.resolve(&volume)];
         let basis = scene.camera.basis();
         let found = lights(&volume, &scene);
         let to_light = match scene.shading.light {
@@ -118,7 +118,7 @@ fn stacks_are_kept_while_nothing_that_they_depend_on_changes() {
     scene.shading.light = Light::Direction(DVec3::new(1.0, -2.0, 0.5));
     let mut kept = KeptLight::default();
     let mut stacks = |scene: &Scene| {
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = [scene.channels[0].transfer.resolve(&volume)];
         let lights = kept.lights((&volume, &transfer), scene, &scene.camera).unwrap().unwrap();
         [&lights.occlusion, &lights.shadow].map(|stack| Arc::clone(&stack.as_ref().unwrap().sheets))
     };
@@ -141,8 +141,8 @@ fn stacks_are_kept_while_nothing_that_they_depend_on_changes() {
         assert!(before.iter().zip(&after).all(|(before, after)| !Arc::ptr_eq(before, after)));
     };
     changed(|scene| scene.splatting.radius = 1.5);
-    changed(|scene| scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.1), (200.0, 0.9)]).unwrap()));
-    changed(|scene| scene.transfer.iso_ranges = Some(vec![[10.0, 300.0]]));
+    changed(|scene| scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.1), (200.0, 0.9)]).unwrap()));
+    changed(|scene| scene.channels[0].transfer.iso_ranges = Some(vec![[10.0, 300.0]]));
     changed(|scene| scene.clip.planes.push([1.0, 0.0, 0.0, 1.0]));
     changed(|scene| scene.camera.up = DVec3::new(0.2, 0.3, 0.8));
 }
@@ -152,7 +152,7 @@ fn a_step_that_needs_too_much_memory_is_refused() {
     let (volume, mut scene) = case(&mut Random(55));
     let volume = volume.with_spacing("long", DVec3::new(1.0, 1.0, 400.0)).unwrap();
     scene.shading.light_step = 0.5;
-    let transfer = scene.transfer.resolve(&volume);
+    let transfer = [scene.channels[0].transfer.resolve(&volume)];
     let error = KeptLight::default().lights((&volume, &transfer), &scene, &scene.camera).unwrap_err();
     let message = error.to_string();
     for words in ["shading.light_step", "0.5", "GB of light sheets", "at least"] {

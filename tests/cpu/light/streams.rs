@@ -112,10 +112,10 @@ fn a_coarser_level_is_drawn_in_the_light_of_a_finer_one() {
 
         let (transfer, framed) = (scene.resolve(&coarse), scene.explicit(&coarse));
         let lights = Arc::new(Lights::new(&fine, &transfer, &framed).unwrap().on(coarse.grid()));
-        let expected = |lights| reference::lit_part(&coarse, &transfer, (&scene, lights), &window).unwrap().colors;
+        let expected = |lights| reference::part(&coarse, &transfer, (&scene, lights), &window).unwrap().colors;
         let (whole, own) = (expected(Some(&lights)), expected(None));
         let apart = |other: &[[f32; 4]]| {
-            let differences = part.content.colors.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| {
+            let differences = part.contents[0].colors.iter().flatten().zip(other.iter().flatten()).map(|(a, b)| {
                 assert!(a.is_finite() && b.is_finite());
                 f64::from(a - b).powi(2)
             });

@@ -13,12 +13,12 @@ use crate::common::{SPACINGS, scene, transfer};
 fn block(dims: UVec3, spacing: DVec3, opacity: f64) -> (Volume, Scene) {
     let volume = Volume::new("block", dims, spacing, vec![1.0; dims.element_product() as usize]).unwrap();
     let mut scene = scene(8, 8);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, opacity)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, opacity)]);
     (volume, scene)
 }
 
 fn sheets(volume: &Volume, scene: &Scene, to_light: DVec3, spread: f64) -> LightSheets {
-    LightSheets::new((volume, &scene.transfer.resolve(volume)), scene, to_light, spread).unwrap()
+    LightSheets::new((volume, &[scene.channels[0].transfer.resolve(volume)]), scene, to_light, spread).unwrap()
 }
 
 /// Behind a block there is `exp(-m·length)` of the light, `m = -ln(1 - α)`, whatever the spacing, the step and the spread: a filter leaves even light even.
@@ -80,7 +80,7 @@ fn a_shadow_spreads_by_its_variance() {
             .collect();
         let volume = Volume::new("two", dims, DVec3::ONE, values).unwrap();
         let mut scene = scene(8, 8);
-        scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (0.5, 1e-9), (1.0, 1e-3)]);
+        scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (0.5, 1e-9), (1.0, 1e-3)]);
         scene.shading.light_step = step;
         let sheets = sheets(&volume, &scene, -DVec3::Y, spread);
         let side = (sheets.planes[0].len() as f64).sqrt() as usize;

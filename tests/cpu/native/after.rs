@@ -110,9 +110,11 @@ fn settings_one_by_one_against_the_twin() {
     }
     check("fixed light", &volume, &|scene| scene.shading.light = Light::Direction(DVec3::new(1.0, -1.0, 0.5)));
     check("gradient opacity", &volume, &|scene| {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (20.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (20.0, 1.0)]).unwrap());
     });
-    check("iso-ranges", &volume, &|scene| scene.transfer.iso_ranges = Some(vec![[50.0, 90.0], [210.0, 300.0]]));
+    check("iso-ranges", &volume, &|scene| {
+        scene.channels[0].transfer.iso_ranges = Some(vec![[50.0, 90.0], [210.0, 300.0]]);
+    });
     println!("worst: {worst:.1?} dB");
 }
 
@@ -124,7 +126,7 @@ fn close_by(compositing: Compositing) -> (Volume, Scene) {
     scene.splatting.compositing = compositing;
     if compositing == Compositing::Minimum {
         scene.clip.crop = Some([-0.45 * half, 0.4 * half]);
-        scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.9), (60.0, 0.8), (200.0, 0.1)]).unwrap());
+        scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.9), (60.0, 0.8), (200.0, 0.1)]).unwrap());
     }
     (volume, scene)
 }
@@ -164,14 +166,14 @@ fn values_chosen_and_surfaces_against_the_twin() {
         scene.splatting.slab_width = 2.0;
     });
     check("gradient opacity", &|_, scene| {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.56), (2.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.56), (2.0, 1.0)]).unwrap());
     });
     check("iso-ranges", &|_, scene| {
-        scene.transfer.iso_ranges = Some(vec![[20.0, 30.0], [45.0, 215.0], [230.0, 300.0]]);
+        scene.channels[0].transfer.iso_ranges = Some(vec![[20.0, 30.0], [45.0, 215.0], [230.0, 300.0]]);
     });
     check("labels", &|volume, scene| {
         *volume = segmented(volume);
-        scene.transfer.labels = labels();
+        scene.channels[0].transfer.labels = labels();
         // Otherwise middles of rays from side to side lie between cells.
         let half = volume.grid().center() * volume.spacing();
         scene.clip.crop = Some([DVec3::new(-0.47, -0.41, -0.52) * half, DVec3::new(0.53, 0.46, 0.44) * half]);
@@ -275,7 +277,7 @@ fn first_hits_are_the_twins() {
             let mut scene = plain.clone();
             scene.camera.projection = projection;
             let host = Host { first_hit: Some(opacity), ..Host::default() };
-            let transfer = scene.transfer.resolve(&volume);
+            let transfer = [scene.channels[0].transfer.resolve(&volume)];
             let expected = reference::render_for(host, &volume, &transfer, &scene, None).unwrap().first_hits;
             let mut renderer = cpu::CpuRenderer::new(volume.clone(), &scene).unwrap();
             renderer.set_first_hit(Some(opacity)).unwrap();
@@ -330,7 +332,7 @@ fn holes_and_labels_against_the_twin() {
         assert!(psnr(&draw(&holey, &scene).image, &twin(&holey, &scene)) > 60.0, "{interpolation:?}");
     }
     let segmented = segmented(&volume);
-    scene.transfer.labels = labels();
+    scene.channels[0].transfer.labels = labels();
     let expected = twin(&segmented, &scene);
     assert!(psnr(&expected, &twin(&volume, &scene)) < 40.0, "labels show");
     assert!(psnr(&draw(&segmented, &scene).image, &expected) > 60.0);
@@ -357,7 +359,7 @@ fn counts_are_the_twins() {
         let (volume, mut scene) = random_after(&mut random);
         scene.splatting.culling = false;
         let counts = draw(&volume, &scene).stats.counts;
-        let expected = reference::count(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+        let expected = reference::count(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
         assert_eq!(counts.voxels_total, expected.voxels_total, "case {case}");
         assert_eq!(counts.voxels_in_range, expected.voxels_in_range, "case {case}");
         assert_eq!(counts.sections_total, expected.sections_total, "case {case}");
@@ -397,9 +399,9 @@ fn constant_regions_have_no_normal() {
 #[test]
 fn surfaces_of_a_single_value_against_the_twin() {
     let (volume, mut scene) = close_by(Compositing::Surface);
-    scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
+    scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
     for value in [60.0, 100.3] {
-        scene.transfer.iso_ranges = Some(vec![[value, value]]);
+        scene.channels[0].transfer.iso_ranges = Some(vec![[value, value]]);
         let expected = twin(&volume, &scene);
         assert!(shown(&expected) > 0.1, "{value} shows nothing");
         let psnr = psnr(&draw(&volume, &scene).image, &expected);

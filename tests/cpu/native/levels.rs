@@ -65,11 +65,11 @@ fn in_coarse_units(scene: &Scene) -> Scene {
     for [x, y, z, d] in &mut scene.clip.planes {
         *d += DVec3::new(*x, *y, *z).dot(PLACE);
     }
-    let opacity = scene.transfer.opacity.as_ref().unwrap();
+    let opacity = scene.channels[0].transfer.opacity.as_ref().unwrap();
     let is_exponential = scene.splatting.compositing == Compositing::Exponential;
     let double = |alpha: f64| if is_exponential { 1.0 - (1.0 - alpha).powi(2) } else { 2.0 * alpha };
     let points = opacity.points().iter().map(|&(at, alpha)| (at, double(alpha))).collect();
-    scene.transfer.opacity = Some(Ramp::new(points).unwrap());
+    scene.channels[0].transfer.opacity = Some(Ramp::new(points).unwrap());
     scene
 }
 
@@ -93,7 +93,7 @@ fn a_level_looks_as_the_same_values_in_units_of_the_finest() {
                 scene.splatting.classification = classification;
                 scene.splatting.culling = false;
                 // Steps, between which doubled opacities are straight too.
-                scene.transfer = transfer(
+                scene.channels[0].transfer = transfer(
                     &[(0.0, [0.2, 0.5, 1.0]), (255.0, [1.0, 0.9, 0.8])],
                     &[(0.0, 0.02), (120.0, 0.02), (120.001, 0.3), (255.0, 0.3)],
                 );

@@ -43,7 +43,7 @@ pub(crate) fn draw(volume: &Volume, scene: &Scene) -> Rendering {
 }
 
 pub(crate) fn twin(volume: &Volume, scene: &Scene) -> Image {
-    reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+    reference::render(volume, &[scene.channels[0].transfer.resolve(volume)], scene).unwrap()
 }
 
 /// PSNR of premultiplied RGBA, peak 1, over all pixels.
@@ -64,7 +64,7 @@ pub(crate) fn head() -> (Volume, Scene) {
     let mut scene = scene(96, 80);
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
     scene.splatting.culling = false;
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(40.0, [0.9, 0.6, 0.4]), (120.0, [0.8, 0.3, 0.2]), (220.0, [1.0, 1.0, 0.9])],
         &[(30.0, 0.0), (80.0, 0.15), (130.0, 0.1), (200.0, 0.9)],
     );
@@ -92,9 +92,9 @@ pub(crate) fn random_case(random: &mut Random) -> (Volume, Scene) {
     }
     let (haze, solid) = (random.pick(&[0.0, 0.01, 0.2]), random.pick(&[0.3, 0.9, 1.0]));
     let opacity = [(5.0, 0.0), (20.0, haze), (200.0, solid)];
-    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 1.0, 1.0])], &opacity);
+    scene.channels[0].transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 1.0, 1.0])], &opacity);
     if random.bits().is_multiple_of(3) {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (60.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (60.0, 1.0)]).unwrap());
     }
     scene.image.background = random.pick(&[[0.0, 0.0, 0.0, 1.0], [1.0, 0.5, 0.2, 0.4], [0.0; 4]]);
     if random.bits().is_multiple_of(3) {
@@ -194,7 +194,7 @@ fn settings_one_by_one_against_the_twin() {
     check("fixed light", &volume, &|scene| scene.shading.light = Light::Direction(DVec3::new(1.0, -1.0, 0.5)));
     check("sharp highlight", &volume, &|scene| (scene.shading.shininess, scene.shading.specular) = (200.0, 1.0));
     check("gradient opacity", &volume, &|scene| {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (20.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.0), (20.0, 1.0)]).unwrap());
     });
     println!("worst: {worst:.1} dB");
 }
@@ -211,7 +211,7 @@ fn holes_and_labels_against_the_twin() {
         color: Some(Ramp::new(vec![(0.0, DVec3::new(0.1, 0.9, 0.3))]).unwrap()),
         ..Default::default()
     };
-    scene.transfer.labels.insert(2, label);
+    scene.channels[0].transfer.labels.insert(2, label);
     assert!(psnr(&draw(&volume, &scene).image, &twin(&volume, &scene)) > REQUIRED);
 }
 
@@ -251,7 +251,7 @@ fn counts_are_the_twins() {
         let (volume, mut scene) = random_case(&mut random);
         scene.splatting.culling = false;
         let counts = draw(&volume, &scene).stats.counts;
-        let expected = reference::count(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+        let expected = reference::count(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
         assert_eq!(counts.voxels_total, expected.voxels_total, "case {case}");
         assert_eq!(counts.voxels_in_range, expected.voxels_in_range, "case {case}");
         assert_eq!(counts.sections_total, expected.sections_total, "case {case}");

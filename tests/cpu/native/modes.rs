@@ -30,10 +30,10 @@ pub(crate) fn share_off(a: &[[f32; 4]], b: &[[f32; 4]]) -> f64 {
 fn random_sheets(random: &mut Random) -> (Volume, Scene) {
     let (volume, mut scene) = random_case(random);
     let (haze, solid) = (random.pick(&[0.0, 0.02, 0.3]), random.pick(&[0.3, 0.9, 1.0]));
-    scene.transfer =
+    scene.channels[0].transfer =
         transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &[(10.0, 0.0), (20.0, haze), (200.0, solid)]);
     if random.bits().is_multiple_of(4) {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (60.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (60.0, 1.0)]).unwrap());
     }
     scene.splatting.method = random.pick(&[Method::ImageAligned, Method::ImageAligned, Method::AxisAligned]);
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0, 3.0]);
@@ -63,7 +63,8 @@ fn any_view_is_that_of_the_twin() {
             let in_units: Option<Vec<f64>> = in_units;
             let host = Host { first_hit, surfaces: in_units.as_deref() };
             let expected =
-                reference::render_for(host, &volume, &scene.transfer.resolve(&volume), &scene, None).unwrap();
+                reference::render_for(host, &volume, &[scene.channels[0].transfer.resolve(&volume)], &scene, None)
+                    .unwrap();
             shows += usize::from(shown(&expected.image) > 0.1);
             let mut renderer = CpuRenderer::new(volume.clone(), &scene).unwrap();
             renderer.set_surfaces(surfaces).unwrap();
@@ -104,7 +105,7 @@ fn a_head_by_means() {
         let mut scene = plain.clone();
         (scene.splatting.compositing, scene.splatting.order) = (compositing, order);
         // Something everywhere, for the minimum, and enough of it for a surface.
-        scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.1), (200.0, 0.9)]).unwrap());
+        scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.1), (200.0, 0.9)]).unwrap());
         let expected = twin(&volume, &scene);
         assert!(shown(&expected) > 0.05, "{compositing:?} shows nothing");
         let psnr = psnr(&crate::native::draw(&volume, &scene).image, &expected);
@@ -118,7 +119,7 @@ fn a_head_by_means() {
 fn surfaces_cull_and_the_others_do_not() {
     let (volume, mut scene) = head();
     scene.camera.direction = DVec3::new(0.4, 0.8, -0.3);
-    scene.transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (60.0, 1.0)]).unwrap());
+    scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(30.0, 0.0), (60.0, 1.0)]).unwrap());
     // Below what a surface that is not reached keeps.
     scene.splatting.opacity_threshold = 0.2;
     for compositing in BY_MEANS {

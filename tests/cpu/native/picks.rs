@@ -21,7 +21,7 @@ fn ball() -> (Volume, sheetsplat::Scene) {
     let values = (0..dims.element_product()).map(value).collect();
     let volume = Volume::new("ball", dims, DVec3::splat(2.0), values).unwrap();
     let mut scene = scene(97, 97);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.5, 0.0), (1.0, 1.0)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.5, 0.0), (1.0, 1.0)]);
     scene.camera.direction = DVec3::Y;
     let labels = Labels { origin: "labels".to_owned(), dims, spacing: None, values: labels, names: BTreeMap::new() };
     (volume.with_labels(labels).unwrap(), scene)

@@ -78,7 +78,7 @@ fn two_channels(volume: &Volume, scene: &Scene) -> (Volume, Scene) {
     let mut channel = Channel::new(VolumeSource::Memory);
     channel.transfer = transfer(&[(0.0, [0.1, 0.9, 0.2])], &[(20.0, 0.0), (220.0, 0.8)]);
     let mut scene = scene.clone();
-    scene.further = vec![channel];
+    scene.channels.push(channel);
     (volume.clone().with_channels("two", vec![mirrored]).unwrap(), scene)
 }
 

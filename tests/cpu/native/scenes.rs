@@ -22,7 +22,8 @@ fn change(scene: &mut Scene, random: &mut Random) {
         2 => scene.shading.gradient = random.pick(&[Gradient::Differences, Gradient::Kernel]),
         3 => {
             let low = random.uniform(20.0, 120.0);
-            scene.transfer = transfer(&[(0.0, [0.9, 0.7, 0.5]), (255.0, [1.0; 3])], &[(low, 0.0), (low + 30.0, 0.8)]);
+            scene.channels[0].transfer =
+                transfer(&[(0.0, [0.9, 0.7, 0.5]), (255.0, [1.0; 3])], &[(low, 0.0), (low + 30.0, 0.8)]);
         }
         4 => scene.clip = Clip { planes: vec![[1.0, 0.2, 0.0, random.uniform(-4.0, 4.0)]], ..Clip::default() },
         5 => *classification = random.pick(&[Classification::Before, Classification::After]),
@@ -45,7 +46,7 @@ fn a_changed_scene_is_drawn_as_a_new_one() {
     let volume = std::sync::Arc::new(builtin::volume("head:16").unwrap());
     let mut random = Random(19);
     let mut scene = scene(40, 40);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(40.0, 0.0), (90.0, 0.7)]);
     scene.camera.projection = sheetsplat::settings::Projection::Orthographic { height: Some(20.0) };
     let mut renderer = CpuRenderer::new(volume.clone(), &scene).unwrap();
     let mut images = std::collections::BTreeSet::new();

@@ -116,7 +116,7 @@ fn spacings_of_scenes_are_streamed() {
     let (streamed, whole) = with_one_thread(|| (open(8_500_000), open(1 << 30)));
     let OpenVolume::Whole(whole) = whole else { panic!("the volume is not in memory") };
     let OpenVolume::Streamed(streamed) = streamed else { panic!("the volume is in memory") };
-    assert_eq!(streamed.first.values.store.levels()[0].grid.spacing, whole.spacing());
+    assert_eq!(streamed.channels[0].values.store.levels()[0].grid.spacing, whole.spacing());
     let drawn = StreamRenderer::new(streamed, &scene).unwrap().draw().unwrap().image;
     assert!(drawn == CpuRenderer::new(whole, &scene).unwrap().draw().unwrap().image);
 }

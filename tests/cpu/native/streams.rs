@@ -10,8 +10,7 @@ use sheetsplat::scene::VolumeSource;
 use sheetsplat::settings::{Classification, Region, Window};
 use sheetsplat::stats::StoreCounts;
 use sheetsplat::volume::{
-    Grid, IndexedStore, Store, StoreIndex, StoreLevel, StreamedChannel, StreamedLevel, StreamedVolume, ValueSlice,
-    Volume, VolumeError,
+    Grid, IndexedStore, Store, StoreIndex, StoreLevel, StreamedLevel, ValueSlice, Volume, VolumeError,
 };
 use sheetsplat::{Image, RenderError, Scene};
 
@@ -218,11 +217,11 @@ fn failures_are_errors() {
         Arc::new(LargeStore([StoreLevel { grid: Grid::new(UVec3::splat(1024), DVec3::ONE), chunk: UVec3::splat(64) }]));
     let error = renderer(large, 0, &volume, &small, 1 << 24).unwrap().draw().unwrap_err().to_string();
     assert!(error.starts_with("volume.level: found 0, in which 32×64 pixels see a box of voxels of "), "{error}");
-    let labelled = store::streamed(store.clone(), 0, &volume, 1 << 30);
-    let several = StreamedVolume { further: vec![labelled.first.clone()], ..labelled.clone() };
-    let labels = Some(StreamedLevel::new("labels", store.clone(), 0));
-    let first = StreamedChannel { labels, ..labelled.first.clone() };
-    for (volume, found) in [(StreamedVolume { first, ..labelled }, "labels"), (several, "several channels")] {
+    let mut labelled = store::streamed(store.clone(), 0, &volume, 1 << 30);
+    let mut several = labelled.clone();
+    several.channels.push(labelled.channels.first().clone());
+    labelled.channels.first_mut().labels = Some(StreamedLevel::new("labels", store.clone(), 0));
+    for (volume, found) in [(labelled, "labels"), (several, "several channels")] {
         let error = StreamRenderer::new(volume, &scene).unwrap_err().to_string();
         assert!(error.starts_with(&format!("volume: found {found} of a volume that is streamed")), "{error}");
     }
@@ -238,7 +237,7 @@ fn failures_are_errors() {
         ),
         ("splatting.method=composite-every-sample", "splatting.method: found \"composite-every-sample\""),
     ] {
-        let scene = Scene::from_volume(scene.volume.clone(), &[set.to_owned()]).unwrap();
+        let scene = Scene::from_volume(scene.channels[0].volume.clone(), &[set.to_owned()]).unwrap();
         let error = renderer(store.clone(), 0, &volume, &scene, 1 << 30).unwrap_err().to_string();
         assert!(error.starts_with(expected), "{error}");
     }
@@ -344,7 +343,7 @@ fn parts_of_streams_are_those_of_the_volume_in_memory() {
                 let window = Window { slabs: slabs.clone(), region: Region { x, y, width, height } };
                 let (part, stats) = streamed.draw_part(&window).unwrap();
                 let expected = whole.draw_part(&window).unwrap().0;
-                assert!(part.content == expected.content, "{classification} {compositing} {window:?}");
+                assert!(part.contents == expected.contents, "{classification} {compositing} {window:?}");
                 assert_ne!(part.identity.fingerprint, expected.identity.fingerprint);
                 let StoreCounts { chunks_read, chunks_total, .. } = stats.store.unwrap();
                 // What the first slabs hide of later ones is drawn in parts.

@@ -26,7 +26,7 @@ fn twin(volume: &Volume, scene: &Scene, depths: &[f32]) -> Image {
     let unit = volume.grid().unit();
     let depths: Vec<f64> = depths.iter().map(|&depth| f64::from(depth) / unit).collect();
     let host = Host { surfaces: Some(&depths), ..Host::default() };
-    reference::render_for(host, volume, &scene.transfer.resolve(volume), scene, None).unwrap().image
+    reference::render_for(host, volume, &[scene.channels[0].transfer.resolve(volume)], scene, None).unwrap().image
 }
 
 /// Depths for every pixel: some beyond everything, some in front of it, most among it.

@@ -38,19 +38,19 @@ fn the_preset_that_fits_is_used_unless_anything_else_is_stated() {
         let named = Scene { camera: open.camera, ..by_name.clone() };
         let fitted = open.fitted(&volume);
         assert_eq!(
-            (fitted.transfer.preset, fitted.shading, fitted.splatting.compositing),
+            (fitted.channels[0].transfer.preset, fitted.shading, fitted.splatting.compositing),
             (Some(Preset::CtBone), Preset::CtBone.shading(), Compositing::Exponential),
             "{text}"
         );
         assert_eq!(fitted.fitted(&volume), fitted, "{text}");
         assert_eq!(open.classification(&volume), Classification::After, "{text}");
-        assert_eq!(open.resolve(&volume), Preset::CtBone.transfer(&volume), "{text}");
+        assert_eq!(open.resolve(&volume)[..], [Preset::CtBone.transfer(&volume)], "{text}");
         assert_eq!(open.explicit(&volume), named.explicit(&volume), "{text}");
         assert!(draw(&open) == draw(&named), "{text}");
     }
     // A host's scene.
     let fitted = Scene::new(VolumeSource::Memory).fitted(&volume);
-    assert_eq!(fitted.transfer.preset, Some(Preset::CtBone));
+    assert_eq!(fitted.channels[0].transfer.preset, Some(Preset::CtBone));
 
     // With anything of a transfer function, the histogram chooses the rest.
     for (text, sets) in
@@ -95,7 +95,7 @@ fn no_preset_is_the_surface_of_the_histogram() {
         [("preset = 'none'", Classification::After), ("preset = 'none'\n[transfer]", Classification::Before)]
     {
         let none = scene(text, &[]);
-        assert_eq!(none.resolve(&volume), TransferFunction::from_histogram(&volume), "{text}");
+        assert_eq!(none.resolve(&volume)[..], [TransferFunction::from_histogram(&volume)], "{text}");
         assert_eq!((none.shading, none.splatting.compositing), (Shading::default(), Compositing::Linear), "{text}");
         assert_eq!(none.classification(&volume), classification, "{text}");
     }
@@ -104,7 +104,7 @@ fn no_preset_is_the_surface_of_the_histogram() {
         Volume::new("ramp", UVec3::splat(8), DVec3::ONE, (0..512).map(|at| (at * 37 % 251) as f32 / 3.0).collect());
     let ramp = ramp.unwrap();
     assert_eq!(Preset::suggested(&ramp), None);
-    assert_eq!(scene("", &[]).fitted(&ramp).transfer.preset, Some(Preset::None));
+    assert_eq!(scene("", &[]).fitted(&ramp).channels[0].transfer.preset, Some(Preset::None));
     assert_eq!(
         scene("", &[]).explicit(&ramp),
         Scene { camera: scene("", &[]).camera, ..scene("preset = 'none'", &[]) }.explicit(&ramp)

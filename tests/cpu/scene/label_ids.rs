@@ -30,16 +30,16 @@ fn tables_of_labels_are_by_their_numbers_in_the_file() {
     assert_eq!(volume.label_ids(), Some(&IDS[..]));
     let transfer = scene.resolve(&volume);
     // Number 3 is no label of the file, whose third label it must not hide.
-    let visible = [1, 2, 3].map(|label| transfer.tables(Some(label)).visible);
+    let visible = [1, 2, 3].map(|label| transfer[0].tables(Some(label)).visible);
     assert_eq!(visible, [false, true, true]);
-    assert_eq!(transfer.tables(Some(2)).color.at(0.0), DVec3::new(0.0, 0.5, 1.0));
-    assert_eq!(transfer.tables(Some(3)).color.at(0.0), DVec3::X);
-    assert_eq!(transfer.tables(Some(1)).color.at(0.0), categories::color((70_000 % 65_521) as u16));
+    assert_eq!(transfer[0].tables(Some(2)).color.at(0.0), DVec3::new(0.0, 0.5, 1.0));
+    assert_eq!(transfer[0].tables(Some(3)).color.at(0.0), DVec3::X);
+    assert_eq!(transfer[0].tables(Some(1)).color.at(0.0), categories::color((70_000 % 65_521) as u16));
     // A saved scene has the same numbers, and so the same tables.
     let saved = scene.explicit(&volume).to_toml(folder.path()).unwrap();
     let again = Scene::parse(&saved, "scene.toml", folder.path(), &[]).unwrap();
-    assert_eq!(again.transfer.labels.keys().copied().collect::<Vec<_>>(), IDS);
-    assert_eq!(again.resolve(&volume).labels, transfer.labels);
+    assert_eq!(again.channels[0].transfer.labels.keys().copied().collect::<Vec<_>>(), IDS);
+    assert_eq!(again.resolve(&volume)[0].labels, transfer[0].labels);
 }
 
 /// Ramps and intervals of a label map are over the file's numbers, and a saved scene's too.
@@ -59,22 +59,22 @@ fn ramps_of_label_maps_are_over_their_numbers_in_the_file() {
     let volume = scene.load_volume().unwrap();
     assert_eq!((volume.label_ids(), volume.values().at(7)), (Some(&IDS[..]), 3.0));
     let transfer = scene.resolve(&volume);
-    let colors = [0, 1, 2, 3].map(|place| transfer.color.at(f64::from(place)));
+    let colors = [0, 1, 2, 3].map(|place| transfer[0].color.at(f64::from(place)));
     assert_eq!(colors, [DVec3::X, DVec3::X, DVec3::Y, DVec3::Z]);
-    assert_eq!([0, 1, 2, 3].map(|place| transfer.opacity.at(f64::from(place))), [0.0, 0.5, 1.0, 1.0]);
-    assert_eq!(transfer.iso_ranges, Some(vec![[1.0, 1.0], [2.0, 3.0]]));
+    assert_eq!([0, 1, 2, 3].map(|place| transfer[0].opacity.at(f64::from(place))), [0.0, 0.5, 1.0, 1.0]);
+    assert_eq!(transfer[0].iso_ranges, Some(vec![[1.0, 1.0], [2.0, 3.0]]));
     let saved = scene.explicit(&volume).to_toml(folder.path()).unwrap();
     let again = parse(&saved);
     assert_eq!(again.resolve(&volume), transfer);
-    let ends: Vec<f64> = again.transfer.iso_ranges.clone().unwrap().concat();
+    let ends: Vec<f64> = again.channels[0].transfer.iso_ranges.clone().unwrap().concat();
     assert_eq!(ends, [70_000.0, 70_000.0, 312_782_547.0, u64::MAX as f64]);
     // No number of the file lies there.
     let nowhere = parse("volume.path = 'labels.nrrd'\ntransfer.iso_ranges = [[5, 6]]").resolve(&volume);
-    assert!((0..4).all(|place| !nowhere.tables(None).in_iso_range(f64::from(place))));
+    assert!((0..4).all(|place| !nowhere[0].tables(None).in_iso_range(f64::from(place))));
     // Ramps that a scene leaves open are chosen over places.
     let chosen = parse("volume.path = 'labels.nrrd'");
-    let colors = [1, 2].map(|place| chosen.resolve(&volume).color.at(f64::from(place)));
+    let colors = [1, 2].map(|place| chosen.resolve(&volume)[0].color.at(f64::from(place)));
     assert_eq!(colors, [70_000, 312_782_547].map(|id| categories::color((id % 65_521) as u16)));
     let again = parse(&chosen.explicit(&volume).to_toml(folder.path()).unwrap());
-    assert_eq!([1, 2].map(|place| again.resolve(&volume).color.at(f64::from(place))), colors);
+    assert_eq!([1, 2].map(|place| again.resolve(&volume)[0].color.at(f64::from(place))), colors);
 }

@@ -9,7 +9,7 @@ mod refusals;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
-use sheetsplat::scene::{Fitting, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
+use sheetsplat::scene::{Channel, Fitting, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
 use sheetsplat::settings::{
     Camera, Classification, Clip, Compositing, Economies, Fit, FootprintBox, FootprintForm, Gradient, Interpolation,
     LabelTables, Light, Method, Order, Projection, Ramp, Rasterizer, Shading, SlabProfile, Splatting,
@@ -32,13 +32,16 @@ fn file(path: &str) -> VolumeSource {
 fn defaults() {
     let scene = parse(MINIMAL, &[]).unwrap();
     assert_eq!(scene, Scene::new(file("folder/a.nrrd")));
-    assert_eq!((scene.spacing, &scene.labels), (None, &None));
+    assert_eq!((scene.channels[0].spacing, &scene.channels[0].labels), (None, &None));
     assert_eq!(scene.camera, Camera { fit: Fit::Object, is_eye_open: true, ..Camera::default() });
     assert_eq!(scene.image, ImageSettings { width: 512, height: 512, background: [0.0, 0.0, 0.0, 1.0] });
-    assert_eq!(scene.transfer, TransferSettings::default());
+    assert_eq!(scene.channels[0].transfer, TransferSettings::default());
     assert_eq!(scene.shading, Shading::default());
     assert_eq!(scene.splatting, Splatting { classification: Classification::Auto, ..Splatting::default() });
-    assert_eq!(parse("[volume]\nbuiltin = 'cube'", &[]).unwrap().volume, VolumeSource::Builtin("cube".to_owned()));
+    assert_eq!(
+        parse("[volume]\nbuiltin = 'cube'", &[]).unwrap().channels[0].volume,
+        VolumeSource::Builtin("cube".to_owned())
+    );
     assert_eq!(
         parse(MINIMAL, &["camera.projection=perspective"]).unwrap().camera.projection,
         Projection::Perspective { fov_y: 30.0, distance: None, near: None }
@@ -152,16 +155,32 @@ fn every_key() {
         resolution = 0.001
     "#;
     let scene = parse(text, &[]).unwrap();
+    let mut channel = Channel::new(file("folder/../b.nrrd"));
+    channel.spacing = Some(DVec3::new(1.0, 1.5, 3.0));
+    channel.labels = Some(PathBuf::from("folder/segments/b.nrrd"));
+    channel.transfer = TransferSettings {
+        color: Some(Ramp::new(vec![(-1.0, DVec3::ZERO), (80.5, DVec3::new(0.9, 0.7, 1.0))]).unwrap()),
+        opacity: Some(Ramp::new(vec![(40.0, 0.0), (60.0, 0.8)]).unwrap()),
+        gradient_opacity: Some(Ramp::new(vec![(0.0, 0.5)]).unwrap()),
+        iso_ranges: Some(vec![[40.0, 255.0], [300.0, 300.0]]),
+        labels: [
+            (0, LabelTables { visible: false, ..LabelTables::default() }),
+            (
+                65535,
+                LabelTables {
+                    visible: true,
+                    color: Some(Ramp::new(vec![(3.0, DVec3::ONE)]).unwrap()),
+                    opacity: Some(Ramp::new(vec![(0.0, 0.0), (9.0, 1.0)]).unwrap()),
+                    gradient_opacity: Some(Ramp::new(vec![(2.0, 0.25)]).unwrap()),
+                    membership: true,
+                },
+            ),
+        ]
+        .into(),
+        ..TransferSettings::default()
+    };
     let expected = Scene {
-        volume: file("folder/../b.nrrd"),
-        spacing: Some(DVec3::new(1.0, 1.5, 3.0)),
-        labels: Some(PathBuf::from("folder/segments/b.nrrd")),
-        index: None,
-        time: None,
-        level: None,
-        series: None,
-        name: None,
-        visible: true,
+        channels: channel.into(),
         camera: Camera {
             projection: Projection::Perspective { fov_y: 45.0, distance: Some(400.0), near: Some(2.0) },
             direction: DVec3::new(1.0, 0.5, 0.0),
@@ -176,28 +195,6 @@ fn every_key() {
             crop: Some([DVec3::new(-1.0, -2.0, -3.0), DVec3::new(4.0, 5.0, 6.5)]),
             shade_faces: false,
         },
-        transfer: TransferSettings {
-            color: Some(Ramp::new(vec![(-1.0, DVec3::ZERO), (80.5, DVec3::new(0.9, 0.7, 1.0))]).unwrap()),
-            opacity: Some(Ramp::new(vec![(40.0, 0.0), (60.0, 0.8)]).unwrap()),
-            gradient_opacity: Some(Ramp::new(vec![(0.0, 0.5)]).unwrap()),
-            iso_ranges: Some(vec![[40.0, 255.0], [300.0, 300.0]]),
-            labels: [
-                (0, LabelTables { visible: false, ..LabelTables::default() }),
-                (
-                    65535,
-                    LabelTables {
-                        visible: true,
-                        color: Some(Ramp::new(vec![(3.0, DVec3::ONE)]).unwrap()),
-                        opacity: Some(Ramp::new(vec![(0.0, 0.0), (9.0, 1.0)]).unwrap()),
-                        gradient_opacity: Some(Ramp::new(vec![(2.0, 0.25)]).unwrap()),
-                        membership: true,
-                    },
-                ),
-            ]
-            .into(),
-            ..TransferSettings::default()
-        },
-        further: Vec::new(),
         shading: Shading {
             enabled: false,
             ambient: 0.0,
@@ -262,13 +259,13 @@ fn overrides() {
     // An override replaces an invalid value, and decides which volume is used.
     assert!(parse(text, &["splatting.radius=9"]).is_err());
     assert!(parse(&text.replace('3', "9"), &["splatting.radius=2"]).is_ok());
-    assert_eq!(parse(text, &["volume.path=x y.nrrd"]).unwrap().volume, file("folder/x y.nrrd"));
-    assert_eq!(parse(text, &["volume.path=\"/x.nrrd\""]).unwrap().volume, file("/x.nrrd"));
+    assert_eq!(parse(text, &["volume.path=x y.nrrd"]).unwrap().channels[0].volume, file("folder/x y.nrrd"));
+    assert_eq!(parse(text, &["volume.path=\"/x.nrrd\""]).unwrap().channels[0].volume, file("/x.nrrd"));
     assert_eq!(
-        parse(MINIMAL, &["volume.builtin=head:64"]).unwrap().volume,
+        parse(MINIMAL, &["volume.builtin=head:64"]).unwrap().channels[0].volume,
         VolumeSource::Builtin("head:64".to_owned())
     );
-    assert_eq!(parse(text, &["volume.path=x.nrrd", "volume.builtin=cube"]).unwrap().volume, {
+    assert_eq!(parse(text, &["volume.path=x.nrrd", "volume.builtin=cube"]).unwrap().channels[0].volume, {
         VolumeSource::Builtin("cube".to_owned())
     });
 
@@ -280,7 +277,7 @@ fn overrides() {
     );
 
     // A value may hold `=`, and arrays are TOML.
-    assert_eq!(parse(text, &["volume.path=a=b.nrrd"]).unwrap().volume, file("folder/a=b.nrrd"));
+    assert_eq!(parse(text, &["volume.path=a=b.nrrd"]).unwrap().channels[0].volume, file("folder/a=b.nrrd"));
     assert_eq!(parse(text, &["camera.direction=[1, 0, 0]"]).unwrap().camera.direction, DVec3::X);
 }
 
@@ -288,9 +285,9 @@ fn overrides() {
 fn volume_alone() {
     let sets = ["image.width=99".to_owned()];
     let scene = Scene::from_volume(VolumeSource::Builtin("cube".to_owned()), &sets).unwrap();
-    assert_eq!((scene.volume, scene.image.width), (VolumeSource::Builtin("cube".to_owned()), 99));
+    assert_eq!((&scene.channels[0].volume, scene.image.width), (&VolumeSource::Builtin("cube".to_owned()), 99));
     let sets = ["volume.path=b.nrrd".to_owned()];
-    assert_eq!(Scene::from_volume(file("a.nrrd"), &sets).unwrap().volume, file("b.nrrd"));
+    assert_eq!(Scene::from_volume(file("a.nrrd"), &sets).unwrap().channels[0].volume, file("b.nrrd"));
     assert_eq!(Scene::from_volume(file("a.nrrd"), &[]).unwrap(), Scene::new(file("a.nrrd")));
 }
 
@@ -301,9 +298,9 @@ fn volumes_in_memory() {
         Scene::parse_for(VolumeSource::Memory, text, "text", Path::new("folder"), &sets)
     };
     let scene = parse_for("[image]\nheight = 7").unwrap();
-    assert_eq!((&scene.volume, scene.image.width, scene.image.height), (&VolumeSource::Memory, 9, 7));
+    assert_eq!((&scene.channels[0].volume, scene.image.width, scene.image.height), (&VolumeSource::Memory, 9, 7));
     // A text that names a volume keeps it.
-    assert_eq!(parse_for(MINIMAL).unwrap().volume, file("folder/a.nrrd"));
+    assert_eq!(parse_for(MINIMAL).unwrap().channels[0].volume, file("folder/a.nrrd"));
     assert_eq!(parse_for(&scene.to_toml(Path::new("folder")).unwrap()).unwrap(), scene);
     assert!(parse_for("transfer.label = [{ label = 3, visible = false }]").is_ok());
     let error = scene.load_volume().unwrap_err().to_string();
@@ -330,7 +327,7 @@ fn tables_of_labels() {
                  [[transfer.label]]\nlabel = 4\ncolor = [[0, [1, 0, 0]]]\ngradient_opacity = [[0, 1]]\n\
                  [[transfer.label]]\nlabel = 5\nvisible = false\nopacity = [[0, 1]]";
     let scene = parse(scene, &[]).unwrap();
-    let transfer = scene.transfer.resolve(&scene.load_volume().unwrap());
+    let transfer = scene.channels[0].transfer.resolve(&scene.load_volume().unwrap());
     let looks = [None, Some(0), Some(2), Some(4), Some(5)].map(|label| {
         let tables = transfer.tables(label);
         (tables.color.at(15.0).y, tables.alpha(15.0, 3.0), tables.alpha(25.0, 3.0))
@@ -344,7 +341,7 @@ fn scene_files() {
     let path = folder.path().join("scene.toml");
     std::fs::write(&path, MINIMAL).unwrap();
     let scene = Scene::open(&path, &["image.height=7".to_owned()]).unwrap();
-    assert_eq!(scene.volume, VolumeSource::File(folder.path().join("a.nrrd")));
+    assert_eq!(scene.channels[0].volume, VolumeSource::File(folder.path().join("a.nrrd")));
     assert_eq!(scene.image.height, 7);
     assert!(scene.load_volume().is_err());
 
@@ -373,7 +370,7 @@ fn shared_scenes() {
     assert!(!scenes.is_empty());
     for path in scenes {
         let scene = Scene::open(&path, &[]).unwrap_or_else(|error| panic!("{error}"));
-        let VolumeSource::File(volume) = scene.volume else { panic!("{} has no file", path.display()) };
+        let VolumeSource::File(volume) = &scene.channels[0].volume else { panic!("{} has no file", path.display()) };
         assert!(volume.is_file(), "{}", volume.display());
     }
 }

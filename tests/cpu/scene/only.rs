@@ -17,7 +17,7 @@ fn loaded(text: &str, folder: &Path) -> (Scene, Volume) {
 fn shown(volume: &Volume, scene: &Scene) -> Vec<u64> {
     let transfer = scene.resolve(volume);
     let takes_part = |&index: &u32| {
-        let (tables, value) = (transfer.tables(volume.label(index)), f64::from(volume.values().at(index as usize)));
+        let (tables, value) = (transfer[0].tables(volume.label(index)), f64::from(volume.values().at(index as usize)));
         tables.visible && tables.in_iso_range(value) && tables.opacity.at(value) > 0.0
     };
     let label = |index: u32| volume.label(index).unwrap_or(volume.values().at(index as usize) as u16);

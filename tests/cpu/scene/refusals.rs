@@ -293,7 +293,7 @@ fn refused_files() {
 fn label_tables_need_labels() {
     let text = "[[transfer.label]]\nlabel = 3\n[volume]\n";
     for volume in ["builtin = 'head'", "builtin = 'tomato:64'", "path = 'a.nrrd'\nlabels = 'b.nrrd'"] {
-        assert_eq!(parse(&format!("{text}{volume}"), &[]).unwrap().transfer.labels.len(), 1, "{volume}");
+        assert_eq!(parse(&format!("{text}{volume}"), &[]).unwrap().channels[0].transfer.labels.len(), 1, "{volume}");
     }
     let refused = |text: &str, sets: &[&str], origin: &str| {
         let message = parse(text, sets).unwrap_err().to_string();

@@ -20,8 +20,8 @@ fn no_rule() -> LowPass {
 
 /// The points at which the rays of all pixels meet all planes in the voxels' box, with the field there.
 fn samples(volume: &Volume, scene: &Scene, check: impl Fn(DVec3, f64, DVec3)) -> usize {
-    let transfer = scene.transfer.resolve(volume);
-    let frame = Frame::new(Host::default(), volume, &transfer, scene).unwrap();
+    let transfer = scene.channels[0].transfer.resolve(volume);
+    let frame = Frame::new(Host::default(), volume, std::slice::from_ref(&transfer), scene).unwrap();
     let last = volume.dims().as_dvec3() - 1.0;
     let mut count = 0;
     for (x, y) in (0..scene.image.height).flat_map(|y| (0..scene.image.width).map(move |x| (x, y))) {
@@ -216,8 +216,8 @@ fn planes_are_as_specified() {
         };
         scene.splatting.slab_width = random.pick(&[0.5, 1.0, 1.7]);
         scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
-        let transfer = scene.transfer.resolve(&volume);
-        let frame = Frame::new(Host::default(), &volume, &transfer, &scene).unwrap();
+        let transfer = scene.channels[0].transfer.resolve(&volume);
+        let frame = Frame::new(Host::default(), &volume, std::slice::from_ref(&transfer), &scene).unwrap();
         for plane in -6..30 {
             if frame.geometry().eye.is_some() && plane <= 0 {
                 assert!(frame.plane_field(plane).iter().all(Option::is_none));
@@ -247,8 +247,8 @@ fn planes_are_a_slab_width_apart() {
     let mut scene = scene(7, 7);
     scene.camera.direction = DVec3::new(0.3, -0.5, 0.7);
     scene.splatting.slab_width = 0.6;
-    let transfer = scene.transfer.resolve(&volume);
-    let frame = Frame::new(Host::default(), &volume, &transfer, &scene).unwrap();
+    let transfer = scene.channels[0].transfer.resolve(&volume);
+    let frame = Frame::new(Host::default(), &volume, std::slice::from_ref(&transfer), &scene).unwrap();
     let pixel = frame.pixel(UVec2::new(3, 3));
     assert!((pixel.at(0.0) - volume.grid().center()).length() < 1e-12);
     let step = (pixel.at(5.0) - pixel.at(4.0)) * volume.spacing();

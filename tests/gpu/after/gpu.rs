@@ -23,7 +23,7 @@ use crate::common::{COMPOSITINGS, RASTERIZERS, camera, transfer};
 /// A small head on a grid with such an aspect, semi-transparent, with a step in its opacity.
 fn head(spacing: [f64; 3]) -> (Volume, Scene) {
     let mut scene = scene(70, 56);
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])],
         &[(30.0, 0.0), (70.0, 0.3), (71.0, 0.02), (150.0, 0.0), (200.0, 0.8)],
     );
@@ -78,7 +78,7 @@ fn for_all(mut scene: Scene, compositing: Compositing) -> Scene {
         Compositing::Surface => &[(30.0, 0.0), (70.0, 0.7), (71.0, 0.1), (150.0, 0.2), (180.0, 0.8)],
         _ => return scene,
     };
-    scene.transfer.opacity = Some(Ramp::new(opacity.to_vec()).unwrap());
+    scene.channels[0].transfer.opacity = Some(Ramp::new(opacity.to_vec()).unwrap());
     scene
 }
 
@@ -124,18 +124,18 @@ fn settings_are_the_twins() {
         ("minified", |scene| scene.camera = camera([0.4, 0.9, -0.3], 120.0)),
         ("back to front", |scene| scene.splatting.order = Order::BackToFront),
         ("unshaded", |scene| scene.shading.enabled = false),
-        ("iso-ranges", |scene| scene.transfer.iso_ranges = Some(vec![[40.0, 90.0], [180.0, 230.0]])),
+        ("iso-ranges", |scene| scene.channels[0].transfer.iso_ranges = Some(vec![[40.0, 90.0], [180.0, 230.0]])),
         ("planes", |scene| scene.clip.planes = vec![[0.3, 1.0, 0.2, 0.5]]),
         ("all tiles", |scene| scene.splatting.tiles = false),
         ("gradient opacity", |scene| {
-            scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (40.0, 1.0)]).unwrap());
+            scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (40.0, 1.0)]).unwrap());
         }),
         ("crop", |scene| scene.clip.crop = Some([DVec3::new(-9.0, -2.0, -9.0), DVec3::new(7.0, 9.0, 12.0)])),
         ("thin crop", |scene| {
             // Most rays meet no plane within it.
             scene.clip.crop = Some([DVec3::new(-30.0, 0.2, -30.0), DVec3::new(30.0, 0.7, 30.0)]);
             if scene.splatting.compositing != Compositing::Minimum {
-                scene.transfer.opacity = Some(Ramp::new(vec![(30.0, 0.1), (255.0, 0.9)]).unwrap());
+                scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(30.0, 0.1), (255.0, 0.9)]).unwrap());
             }
         }),
     ];
@@ -172,7 +172,7 @@ fn culling_keeps_its_promise() {
             scene.camera = camera([0.4, 0.9, -0.3], 300.0);
             scene.splatting.opacity_threshold = THRESHOLD;
             let colors = [(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])];
-            scene.transfer = transfer(&colors, &[(30.0, 0.0), (60.0, 0.9)]);
+            scene.channels[0].transfer = transfer(&colors, &[(30.0, 0.0), (60.0, 0.9)]);
             scene = for_all(scene, compositing);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
             for rasterizer in RASTERIZERS {
@@ -223,7 +223,8 @@ fn holes_and_labels(gpu: &GpuHeadless, mut scene: Scene) {
     let labelled = volume.with_labels(labels).unwrap();
     let own =
         LabelTables { opacity: Some(Ramp::new(vec![(20.0, 0.0), (90.0, 0.7)]).unwrap()), ..LabelTables::default() };
-    scene.transfer.labels = [(1, own), (2, LabelTables { visible: false, ..LabelTables::default() })].into();
+    scene.channels[0].transfer.labels =
+        [(1, own), (2, LabelTables { visible: false, ..LabelTables::default() })].into();
     assert_twins(gpu, (&labelled, &scene), 60.0, &format!("labels, {compositing:?}"));
 }
 
@@ -232,7 +233,8 @@ fn holes_and_labels(gpu: &GpuHeadless, mut scene: Scene) {
 fn constant_regions_have_no_normal() {
     let (_, mut scene) = head([1.0; 3]);
     scene.shading.gradient = Gradient::Kernel;
-    scene.transfer = transfer(&[(0.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(190.0, 0.0), (200.0, 0.5)]);
+    scene.channels[0].transfer =
+        transfer(&[(0.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])], &[(190.0, 0.0), (200.0, 0.5)]);
     let value = |index: u32| match index {
         0 => 0.0,
         4095 => 255.0,
@@ -273,7 +275,8 @@ fn surfaces_and_first_hits_are_the_twins() {
             let first_hit = (compositing != Compositing::Minimum).then_some(0.1);
             let host = Host { surfaces: Some(&depths), first_hit };
             let expected =
-                reference::render_for(host, &volume, &scene.transfer.resolve(&volume), &scene, None).unwrap();
+                reference::render_for(host, &volume, &[scene.channels[0].transfer.resolve(&volume)], &scene, None)
+                    .unwrap();
             assert_shows(&expected.image, &scene);
             let whole = render(&volume, &scene);
             assert!(rms(&whole, &expected.image) > 1e-3, "{compositing:?}: the surface cuts nothing");
@@ -317,8 +320,8 @@ fn what_is_left_out_shows_nothing() {
             let mut scene = head([1.0; 3]).1;
             scene.camera = camera([0.43, 0.87, -0.31], 34.0);
             scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-            scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (0.4, 0.3)]).unwrap());
-            scene.transfer.color = Some(Ramp::new(vec![(0.0, DVec3::X), (255.0, DVec3::Y)]).unwrap());
+            scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0), (0.4, 0.3)]).unwrap());
+            scene.channels[0].transfer.color = Some(Ramp::new(vec![(0.0, DVec3::X), (255.0, DVec3::Y)]).unwrap());
             scene.splatting.compositing = Compositing::Exponential;
             assert_twins(gpu, (&volume, &scene), 60.0, &format!("{spacing:?} {projection:?}"));
             let Counts { voxels_in_range, voxels_total, .. } =
@@ -349,11 +352,11 @@ fn counts_are_the_twins() {
                 Compositing::Minimum => vec![(0.0, 0.9), (90.0, 0.0)],
                 _ => vec![(120.0, 0.0), (250.0, 0.9)],
             };
-            scene.transfer.opacity = Some(Ramp::new(opacity).unwrap());
+            scene.channels[0].transfer.opacity = Some(Ramp::new(opacity).unwrap());
             // Tiles gather nothing at pixels whose rays are cut away.
             scene.clip.crop = None;
             scene.splatting.tiles = false;
-            let expected = reference::count(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+            let expected = reference::count(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
             let of = |counts: &Counts| {
                 [
                     counts.voxels_total,
@@ -396,9 +399,9 @@ fn surfaces_of_a_single_value_are_the_twins() {
     let gpu = gpu();
     let (volume, scene) = head([1.0, 1.0, 1.5]);
     let mut scene = for_all(scene, Compositing::Surface);
-    scene.transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
+    scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.8)]).unwrap());
     for value in [60.0, 100.3] {
-        scene.transfer.iso_ranges = Some(vec![[value, value]]);
+        scene.channels[0].transfer.iso_ranges = Some(vec![[value, value]]);
         assert_twins(gpu, (&volume, &scene), 60.0, &format!("{value}"));
     }
 }

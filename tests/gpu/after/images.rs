@@ -15,7 +15,7 @@ pub(crate) fn head() -> (Volume, Scene) {
     let mut scene = scene(64, 60);
     scene.camera.direction = DVec3::new(0.4, 0.9, -0.3);
     scene.splatting.compositing = Compositing::Exponential;
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(40.0, [0.9, 0.6, 0.4]), (150.0, [0.5, 0.2, 0.2]), (255.0, [1.0, 1.0, 0.9])],
         &[(30.0, 0.0), (60.0, 0.3), (120.0, 0.1), (200.0, 0.9)],
     );
@@ -31,7 +31,7 @@ fn perspective_rays_have_their_own_lengths() {
     scene.camera.up = DVec3::Z;
     scene.splatting.compositing = Compositing::Xray;
     scene.shading.enabled = false;
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.1)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.1)]);
     let image = render(&volume, &scene);
     for (at, pixel) in (0..).zip(&image.pixels) {
         let step = 2.0 * 12.5_f64.to_radians().tan() / 9.0;
@@ -50,12 +50,12 @@ fn cuts_shorten_rays() {
     scene.splatting.compositing = Compositing::Xray;
     scene.splatting.slab_width = 0.7;
     scene.shading.enabled = false;
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.01)]);
-    let transfer = scene.transfer.resolve(&volume);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.01)]);
+    let transfer = scene.channels[0].transfer.resolve(&volume);
     // 12 voxels of 2 units each.
     let alpha = |scene: &Scene, surfaces: Option<&[f64]>| {
         let host = Host { surfaces, first_hit: Some(0.05) };
-        reference::render_for(host, &volume, &transfer, scene, None).unwrap()
+        reference::render_for(host, &volume, std::slice::from_ref(&transfer), scene, None).unwrap()
     };
     let whole = alpha(&scene, None);
     assert!(whole.image.pixels.iter().all(|pixel| (pixel[3] - 0.24).abs() < 1e-6));
@@ -79,8 +79,8 @@ fn sheets_make_the_image() {
     for (compositing, projection) in [(Compositing::Linear, None), (Compositing::Exponential, Some(eye(600.0)))] {
         scene.splatting.compositing = compositing;
         scene.camera.projection = projection.unwrap_or(scene.camera.projection);
-        let transfer = scene.transfer.resolve(&volume);
-        let frame = Frame::new(Host::default(), &volume, &transfer, &scene).unwrap();
+        let transfer = scene.channels[0].transfer.resolve(&volume);
+        let frame = Frame::new(Host::default(), &volume, std::slice::from_ref(&transfer), &scene).unwrap();
         let pixels = (0..20).flat_map(|y| (0..24).map(move |x| glam::UVec2::new(x, y)));
         let slabs = pixels.map(|at| frame.pixel(at).slabs()).filter(|slabs| !slabs.is_empty());
         let (first, end) = slabs.fold((i32::MAX, i32::MIN), |(a, b), slabs| (a.min(slabs.start), b.max(slabs.end)));
@@ -103,8 +103,8 @@ fn sheets_make_the_image() {
 #[test]
 fn counts() {
     let (volume, mut scene) = head();
-    let transfer = scene.transfer.resolve(&volume);
-    let counts = reference::count(&volume, &transfer, &scene).unwrap();
+    let transfer = scene.channels[0].transfer.resolve(&volume);
+    let counts = reference::count(&volume, std::slice::from_ref(&transfer), &scene).unwrap();
     assert_eq!(counts.voxels_total, u64::from(volume.dims().element_product()));
     assert!(counts.voxels_in_range > 0 && counts.voxels_in_range <= counts.voxels_total);
     // A kernel of radius 2 meets four planes at distances of one unit, and rarely three.
@@ -112,19 +112,19 @@ fn counts() {
     assert!((3.9..=4.0).contains(&planes), "{planes}");
     assert!(counts.sheets > 20 && counts.sheets < 80, "{counts:?}");
     scene.splatting.slab_width = 0.5;
-    let halved = reference::count(&volume, &transfer, &scene).unwrap();
+    let halved = reference::count(&volume, std::slice::from_ref(&transfer), &scene).unwrap();
     assert!((7.9..=8.1).contains(&(halved.sections_total as f64 / halved.voxels_in_range as f64)));
     // For a single bright voxel in the dark, only bricks within two kernels and a slab of it count.
     let dot =
         crate::after::volume([40, 40, 40], DVec3::ONE, |voxel| f64::from(u8::from(voxel == UVec3::splat(21))) * 255.0);
     scene.splatting.slab_width = 1.0;
-    scene.transfer.opacity = Some(Ramp::new(vec![(10.0, 0.0), (20.0, 1.0)]).unwrap());
-    let transfer = scene.transfer.resolve(&dot);
-    let counts = reference::count(&dot, &transfer, &scene).unwrap();
+    scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(10.0, 0.0), (20.0, 1.0)]).unwrap());
+    let transfer = scene.channels[0].transfer.resolve(&dot);
+    let counts = reference::count(&dot, std::slice::from_ref(&transfer), &scene).unwrap();
     assert!((64..=4096).contains(&counts.voxels_in_range), "{counts:?}");
-    scene.transfer.opacity = Some(Ramp::new(vec![(300.0, 0.0), (310.0, 1.0)]).unwrap());
-    let transfer = scene.transfer.resolve(&dot);
-    let counts = reference::count(&dot, &transfer, &scene).unwrap();
+    scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(300.0, 0.0), (310.0, 1.0)]).unwrap());
+    let transfer = scene.channels[0].transfer.resolve(&dot);
+    let counts = reference::count(&dot, std::slice::from_ref(&transfer), &scene).unwrap();
     assert_eq!([counts.voxels_in_range, counts.sections_total, counts.sheets], [0; 3]);
     assert!(render(&dot, &scene).pixels.iter().all(|pixel| *pixel == [0.0; 4]));
 }

@@ -39,5 +39,5 @@ pub(crate) fn eye(distance: f64) -> Projection {
 }
 
 pub(crate) fn render(volume: &Volume, scene: &Scene) -> Image {
-    reference::render(volume, &scene.transfer.resolve(volume), scene).unwrap()
+    reference::render(volume, &[scene.channels[0].transfer.resolve(volume)], scene).unwrap()
 }

@@ -79,7 +79,8 @@ fn constants_are_reconstructed() {
             scene.shading.enabled = false;
             let is_of_amounts = BY_AMOUNTS.contains(&compositing);
             let (dark, opacity) = if is_of_amounts { (0.0, (0.02, 0.02)) } else { (1.0, (0.0, 1.0)) };
-            scene.transfer = transfer(&[(0.0, [dark; 3]), (255.0, [1.0; 3])], &[(0.0, opacity.0), (255.0, opacity.1)]);
+            scene.channels[0].transfer =
+                transfer(&[(0.0, [dark; 3]), (255.0, [1.0; 3])], &[(0.0, opacity.0), (255.0, opacity.1)]);
             for pixel in draw.image(&volume, &scene).pixels {
                 let share = if is_of_amounts { pixel[0] / pixel[3] } else { pixel[3] };
                 let error = (f64::from(share) * 255.0 - VALUE) / 255.0;
@@ -108,7 +109,7 @@ fn normals_of_a_ramp() {
                 scene.splatting.compositing = compositing;
                 (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
                 scene.shading.light = Light::Direction(light);
-                scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(500.0, 0.0), (500.1, 1.0)]);
+                scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(500.0, 0.0), (500.1, 1.0)]);
                 let angle = slope.angle_between(light);
                 let expected = angle.min(std::f64::consts::PI - angle).to_degrees();
                 for pixel in draw.image(&volume, &scene).pixels {
@@ -153,7 +154,7 @@ fn a_uniform_slab_is_as_opaque_as_it_is_thick() {
             scene.splatting.slab_width = random.pick(&[0.3, 1.0, 1.7]);
             scene.splatting.compositing = Compositing::Exponential;
             scene.shading.enabled = false;
-            scene.transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(0.0, OPACITY)]);
+            scene.channels[0].transfer = transfer(&[(0.0, [0.2, 0.5, 0.9])], &[(0.0, OPACITY)]);
             let units = 4.0 * spacing[axis] / spacing.min_element();
             let basis = scene.camera.basis();
             let per_pixel = if case % 2 == 1 { 2.0 * 1.0_f64.to_radians().tan() / 9.0 } else { 0.0 };
@@ -181,7 +182,7 @@ fn opaque_pixels_stop_behind_groups_of_sheets() {
     scene.splatting.compositing = Compositing::Exponential;
     scene.shading.enabled = false;
     // Pixels become opaque 3.3 units behind the volume's near side, which is a multiple of the slab widths from its middle.
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.6)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.6)]);
     let whole = Window::whole([9, 9]);
     for (slab_width, units) in [(2.0, 4.0), (1.0, 4.0), (0.5, 4.0), (0.25, 4.0), (0.125, 3.5)] {
         scene.splatting.slab_width = slab_width;
@@ -190,8 +191,8 @@ fn opaque_pixels_stop_behind_groups_of_sheets() {
         let (by_tiles, _) = gpu().draw_part(&mut gpu().view(volume.clone(), &scene).unwrap(), &whole).unwrap();
         for (name, part) in [("cpu", by_cores), ("tiles", by_tiles)] {
             let expected = 1.0 - 0.4_f64.powf(units);
-            assert_eq!(part.content.colors.len(), 81, "{name}");
-            for pixel in &part.content.colors {
+            assert_eq!(part.contents[0].colors.len(), 81, "{name}");
+            for pixel in &part.contents[0].colors {
                 let what = format_args!("{name}, slab width {slab_width}: {pixel:?}, not {expected}");
                 assert_at_most((f64::from(pixel[3]) - expected).abs(), 1e-5, what);
             }
@@ -235,7 +236,8 @@ fn the_cube_does_not_pop() {
         {
             let mut scene = scene(128, 128);
             scene.camera.up = DVec3::Z;
-            scene.transfer = transfer(&[(0.0, [0.0, 0.5, 1.0]), (255.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
+            scene.channels[0].transfer =
+                transfer(&[(0.0, [0.0, 0.5, 1.0]), (255.0, [1.0; 3])], &[(0.0, 0.0), (255.0, 0.5)]);
             (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
             (scene.splatting.compositing, scene.splatting.interpolation) = (compositing, interpolation);
             let turned = |scene: &Scene, from: f64| {
@@ -271,7 +273,8 @@ fn matter_at_the_end_of_the_range_is_matter() {
         let mut scene = scene(96, 96);
         scene.camera = camera([0.70463, 0.70957, 0.2], 40.0);
         let ends = if inverted { [0.5, 0.0] } else { [0.0, 0.5] };
-        scene.transfer = transfer(&[(0.0, [0.0, 0.5, 1.0]), (255.0, [1.0; 3])], &[(0.0, ends[0]), (255.0, ends[1])]);
+        scene.channels[0].transfer =
+            transfer(&[(0.0, [0.0, 0.5, 1.0]), (255.0, [1.0; 3])], &[(0.0, ends[0]), (255.0, ends[1])]);
         (scene.shading.ambient, scene.shading.diffuse, scene.shading.specular) = (0.0, 1.0, 0.0);
         scene.splatting.culling = false;
         let expected = render(&volume, &scene);
@@ -295,7 +298,7 @@ fn surface_and_exponential_agree_on_an_opaque_step() {
             scene.camera = camera([0.2, 1.0, -0.3], 18.0);
             scene.image.background = [0.0, 0.0, 0.0, 1.0];
             scene.shading.light = Light::Direction(DVec3::new(-0.5, -1.0, 0.5));
-            scene.transfer = transfer(&[(0.0, [0.9, 0.5, 0.2])], &[(49.9, 0.0), (50.1, 1.0)]);
+            scene.channels[0].transfer = transfer(&[(0.0, [0.9, 0.5, 0.2])], &[(49.9, 0.0), (50.1, 1.0)]);
             scene.splatting.slab_width = slab_width;
             let [surface, exponential] = [Compositing::Surface, Compositing::Exponential].map(|compositing| {
                 scene.splatting.compositing = compositing;

@@ -52,7 +52,7 @@ fn settings_that_exclude_after_are_named() {
         let mut scene = parse(sets).unwrap();
         scene.splatting.classification = Classification::After;
         let volume = scene.load_volume().unwrap();
-        let error = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap_err();
+        let error = reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap_err();
         let RenderError::OutOfRange(error) = error else { panic!("{error}") };
         let (at, was, may) = (error.key, error.found.to_string(), error.allowed.to_string());
         assert_eq!(at, format!("splatting.{key}"), "{sets:?}");

@@ -40,7 +40,6 @@ fn random_transfer(random: &mut Random, [min, max]: [f64; 2]) -> TransferFunctio
         iso_ranges: random.pick(&[false, true]).then_some(ranges),
         membership: false,
         labels: BTreeMap::new(),
-        further: Vec::new(),
     }
 }
 
@@ -100,7 +99,6 @@ fn narrow_peaks_beside_plateaus() {
         iso_ranges: None,
         membership: false,
         labels: BTreeMap::new(),
-        further: Vec::new(),
     };
     let numbers = Normalization::new([0.0, 65535.0]);
     let points = table(&transfer.tables(None), &Splatting::default(), &numbers);

@@ -32,15 +32,15 @@ fn random_case(random: &mut Random, has_eye: bool) -> (Volume, Scene) {
     }
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 1.0, 1.7]);
     scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7, 4.0]);
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(0.0, [0.2, 0.3, 0.9]), (120.0, [0.9, 0.6, 0.1]), (250.0, [1.0, 0.9, 0.8])],
         &[(15.0, 0.0), (40.0, 0.1), (130.0, 0.05), (200.0, 0.7)],
     );
     if random.bits().is_multiple_of(3) {
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (30.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (30.0, 1.0)]).unwrap());
     }
     if random.bits().is_multiple_of(4) {
-        scene.transfer.iso_ranges = Some(vec![[20.0, 90.0], [140.0, 1000.0]]);
+        scene.channels[0].transfer.iso_ranges = Some(vec![[20.0, 90.0], [140.0, 1000.0]]);
     }
     if random.bits().is_multiple_of(3) {
         let normal = random.direction();
@@ -66,7 +66,7 @@ fn compare(seed: u64, has_eye: bool, least: f64, change: impl Fn(&mut Random, &m
             // A cubic slab is empty or bent by whether its ends reach an opacity, which rounding decides here and there: `random` leaves such pixels out.
             scene.splatting.slab_profile = SlabProfile::Linear;
             change(&mut random, &mut volume, &mut scene);
-            let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+            let expected = reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
             // A picture that is nearly empty tests nothing.
             if shown(&expected) < 100 {
                 assert!(attempt < 100, "{compositing:?}: too few cases show something");
@@ -124,7 +124,7 @@ fn frames_of_many_dispatches_agree_with_the_f64_evaluation() {
     for (slab_width, direction) in [(1.0, DVec3::Z), (1.0, DVec3::new(0.4, 0.9, -0.3)), (0.6, DVec3::X)] {
         let volume = random_volume(&mut random, (44.0, 49.0), SPACINGS[0]);
         let (_, mut scene) = random_case(&mut random, false);
-        (scene.transfer.iso_ranges, scene.transfer.gradient_opacity) = (None, None);
+        (scene.channels[0].transfer.iso_ranges, scene.channels[0].transfer.gradient_opacity) = (None, None);
         scene.clip.planes.clear();
         (scene.splatting.slab_width, scene.splatting.radius, scene.camera.direction) = (slab_width, 2.0, direction);
         let half = (volume.grid().center() * volume.spacing()).length();
@@ -132,7 +132,7 @@ fn frames_of_many_dispatches_agree_with_the_f64_evaluation() {
         scene.camera.projection = Projection::Orthographic { height: Some(2.0 * half) };
         scene.splatting.compositing = Compositing::Xray;
         let found = gpu.render_volume(volume.clone(), &scene).unwrap().image;
-        let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+        let expected = reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
         assert!(shown(&expected) > 100, "{}", shown(&expected));
         assert_at_least(decibels(rms(&found, &expected)), 80.0, format!("{slab_width} {direction}"));
     }
@@ -147,7 +147,7 @@ fn culling_keeps_its_guarantee() {
     for case in 0..8 {
         let (volume, mut scene) = random_case(&mut random, case % 2 == 1);
         scene.splatting.compositing = [Compositing::Linear, Compositing::Exponential][case / 2 % 2];
-        scene.transfer.opacity = Some(Ramp::new(vec![(15.0, 0.0), (40.0, 0.5), (200.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.opacity = Some(Ramp::new(vec![(15.0, 0.0), (40.0, 0.5), (200.0, 1.0)]).unwrap());
         let whole = gpu.render_volume(volume.clone(), &scene).unwrap();
         seen += shown(&whole.image);
         for threshold in [0.8, 1.0] {

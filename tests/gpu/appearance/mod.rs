@@ -30,9 +30,9 @@ fn a_preset_gives_way_to_what_the_scene_says() {
     let volume = builtin::volume("head:24").unwrap();
     for (name, preset) in Preset::ALL {
         let plain = builtin_scene("head:24", &[&format!("preset={name}")]);
-        assert_eq!((plain.transfer.preset, plain.shading), (Some(preset), preset.shading()), "{name}");
+        assert_eq!((plain.channels[0].transfer.preset, plain.shading), (Some(preset), preset.shading()), "{name}");
         assert_eq!(plain.splatting.compositing, preset.compositing(), "{name}");
-        assert_eq!(plain.transfer.resolve(&volume), preset.transfer(&volume), "{name}");
+        assert_eq!(plain.channels[0].transfer.resolve(&volume), preset.transfer(&volume), "{name}");
 
         let text = format!(
             "preset = '{name}'\nvolume.builtin = 'head:24'\ntransfer.opacity = [[7, 0.25]]\n\
@@ -45,7 +45,7 @@ fn a_preset_gives_way_to_what_the_scene_says() {
             (preset.shading().diffuse, preset.shading().enabled)
         );
         assert_eq!(scene.splatting.compositing, Compositing::Linear);
-        let transfer = scene.transfer.resolve(&volume);
+        let transfer = scene.channels[0].transfer.resolve(&volume);
         assert_eq!(transfer.opacity, Ramp::new(vec![(7.0, 0.25)]).unwrap());
         assert_eq!(transfer.color, preset.transfer(&volume).color, "{name}");
     }
@@ -208,8 +208,8 @@ fn the_labels_preset_colours_segments_too() {
     let volume = builtin::volume("head:24").unwrap();
     let text = "transfer.label=[{label = 2, opacity = [[0, 0.5]]}, {label = 0}]";
     let scene = builtin_scene("head:24", &["preset=labels", text]);
-    scene.transfer.check_volume(&volume).unwrap();
-    let transfer = scene.transfer.resolve(&volume);
+    scene.channels[0].transfer.check_volume(&volume).unwrap();
+    let transfer = scene.channels[0].transfer.resolve(&volume);
     assert_eq!(transfer.tables(Some(5)).color.at(200.0), categories::color(5));
     // The preset fills in what a table of the scene omits.
     assert_eq!(transfer.tables(Some(2)).opacity, &Ramp::new(vec![(0.0, 0.5)]).unwrap());
@@ -217,8 +217,11 @@ fn the_labels_preset_colours_segments_too() {
     assert!(transfer.tables(Some(0)).visible);
     assert!(!Preset::Labels.transfer(&volume).tables(Some(0)).visible);
 
-    let message =
-        builtin_scene("cube:8", &["preset=labels"]).transfer.check_volume(&row(&[0.5, 1.0])).unwrap_err().to_string();
+    let message = builtin_scene("cube:8", &["preset=labels"]).channels[0]
+        .transfer
+        .check_volume(&row(&[0.5, 1.0]))
+        .unwrap_err()
+        .to_string();
     assert!(
         message.starts_with("preset: found labels, for a volume without labels, allowed: values that"),
         "{message}"
@@ -231,7 +234,7 @@ fn the_labels_preset_colours_segments_too() {
         names: BTreeMap::new(),
     };
     let labelled = row(&[0.5, 1.0]).with_labels(labels).unwrap();
-    builtin_scene("cube:8", &["preset=labels"]).transfer.check_volume(&labelled).unwrap();
+    builtin_scene("cube:8", &["preset=labels"]).channels[0].transfer.check_volume(&labelled).unwrap();
 }
 
 #[test]
@@ -241,7 +244,7 @@ fn a_colour_map_spans_what_shows_and_keeps_the_opacity() {
     let sets = ["transfer.opacity=[[199.5, 0], [250, 0.5]]", "transfer.iso_ranges=[[0, 799.5]]"];
     let resolved = |map: &str| {
         let map = format!("transfer.colormap={map}");
-        builtin_scene("cube:8", &[sets[0], sets[1], &map]).transfer.resolve(&volume)
+        builtin_scene("cube:8", &[sets[0], sets[1], &map]).channels[0].transfer.resolve(&volume)
     };
     let transfer = resolved("viridis");
     assert_eq!(transfer.opacity, Ramp::new(vec![(199.5, 0.0), (250.0, 0.5)]).unwrap());
@@ -266,8 +269,8 @@ fn a_colour_map_spans_what_shows_and_keeps_the_opacity() {
         }
     }
     let nothing = builtin_scene("cube:8", &["transfer.colormap=magma", "transfer.opacity=[[0, 0]]"]);
-    assert_eq!(shown_range(&volume, &nothing.transfer.resolve(&volume)), None);
-    let constant = builtin_scene("cube:8", &["transfer.colormap=gray"]).transfer.resolve(&row(&[3.0; 9]));
+    assert_eq!(shown_range(&volume, &nothing.channels[0].transfer.resolve(&volume)), None);
+    let constant = builtin_scene("cube:8", &["transfer.colormap=gray"]).channels[0].transfer.resolve(&row(&[3.0; 9]));
     assert_eq!(constant.color.at(3.0), DVec3::ONE);
 }
 
@@ -277,7 +280,7 @@ fn a_colour_map_and_colours_are_one_thing() {
     let message = Scene::parse(text, "scene.toml", Path::new(""), &[]).unwrap_err().to_string();
     assert!(message.starts_with("scene.toml: transfer: found both color and colormap, allowed: one of"), "{message}");
     let of = |sets: &[&str]| {
-        let TransferSettings { color, colormap, .. } = builtin_scene("cube:8", sets).transfer;
+        let TransferSettings { color, colormap, .. } = builtin_scene("cube:8", sets).channels[0].transfer.clone();
         (color.is_some(), colormap)
     };
     let [color, map] = ["transfer.color=[[0, [1, 1, 1]]]", "transfer.colormap=hot"];
@@ -341,7 +344,7 @@ fn many_scenes() -> Vec<Scene> {
     let raw = ["volume.dims=[3,4,5]", "volume.type=float32", "volume.endian=big", "volume.offset=7", image];
     let raw = raw.map(str::to_owned);
     let from_file = Scene::from_volume(VolumeSource::File("/nowhere/ct.raw".into()), &raw).unwrap();
-    assert!(matches!(from_file.volume, VolumeSource::Raw(..)));
+    assert!(matches!(from_file.channels[0].volume, VolumeSource::Raw(..)));
     scenes.push(from_file);
     scenes.extend(Preset::ALL.map(|(name, _)| builtin_scene("head:24", &[image, &format!("preset={name}")])));
     scenes.extend(
@@ -374,11 +377,12 @@ fn a_written_scene_is_read_as_the_same() {
 #[test]
 fn an_explicit_scene_renders_the_same_bytes_without_choosing() {
     let gpu = gpu();
-    for scene in many_scenes().into_iter().filter(|scene| matches!(scene.volume, VolumeSource::Builtin(_))) {
+    for scene in many_scenes().into_iter().filter(|scene| matches!(scene.channels[0].volume, VolumeSource::Builtin(_)))
+    {
         let volume = scene.load_volume().unwrap();
         let explicit = scene.explicit(&volume);
-        assert_eq!((explicit.transfer.preset, explicit.transfer.colormap), (None, None));
-        assert!(explicit.transfer.color.is_some() && explicit.transfer.opacity.is_some());
+        assert_eq!((explicit.channels[0].transfer.preset, explicit.channels[0].transfer.colormap), (None, None));
+        assert!(explicit.channels[0].transfer.color.is_some() && explicit.channels[0].transfer.opacity.is_some());
         match explicit.camera.projection {
             Projection::Orthographic { height } => assert!(height.is_some()),
             Projection::Perspective { distance, near, .. } => assert!(distance.is_some() && near.is_some()),
@@ -407,17 +411,17 @@ fn paths_are_written_as_they_are_found_from_the_folder() {
         std::fs::write(root.join(name), "").unwrap();
     }
     let mut scene = Scene::new(VolumeSource::File(root.join("a/../data/v.nrrd")));
-    scene.labels = Some(root.join("a/b/l.nrrd"));
+    scene.channels[0].labels = Some(root.join("a/b/l.nrrd"));
     // Absolute paths stay.
     let read = |text: &str, folder: &Path| Scene::parse(text, "scene.toml", folder, &[]).unwrap();
     assert_eq!(read(&scene.to_toml(&root.join("a")).unwrap(), Path::new("x")), scene);
     // Relative paths lead to the same files.
     let here = std::env::current_dir().unwrap();
     let up: std::path::PathBuf = here.components().skip(1).map(|_| "..").collect();
-    scene.volume = VolumeSource::File(up.join(root.join("data/v.nrrd").strip_prefix("/").unwrap()));
-    scene.labels = Some(up.join(root.join("a/b/l.nrrd").strip_prefix("/").unwrap()));
+    scene.channels[0].volume = VolumeSource::File(up.join(root.join("data/v.nrrd").strip_prefix("/").unwrap()));
+    scene.channels[0].labels = Some(up.join(root.join("a/b/l.nrrd").strip_prefix("/").unwrap()));
     let text = scene.to_toml(&root.join("a")).unwrap();
     assert!(text.contains("path = \"../data/v.nrrd\"") && text.contains("labels = \"b/l.nrrd\""), "{text}");
-    let Scene { volume: VolumeSource::File(path), .. } = read(&text, &root.join("a")) else { panic!("{text}") };
+    let VolumeSource::File(path) = read(&text, &root.join("a")).channels[0].volume.clone() else { panic!("{text}") };
     assert_eq!(path.canonicalize().unwrap(), root.join("data/v.nrrd"));
 }

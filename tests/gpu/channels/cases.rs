@@ -39,7 +39,7 @@ fn label(random: &mut Random, volume: &Volume, scene: &mut Scene) -> Volume {
         channel.clone().with_labels(Labels { origin: "labels".to_owned(), dims, spacing: None, values, names }).unwrap()
     };
     let channels: Vec<Volume> = volume.channels().map(single).collect();
-    let further = vec![labelled(&channels[1], 3), channels[2].clone()];
+    let others = vec![labelled(&channels[1], 3), channels[2].clone()];
     let mut tables = || {
         let color = DVec3::from([(); 3].map(|()| random.uniform(0.0, 1.0)));
         let ramp = vec![(10.0, 0.0), (180.0, random.uniform(0.2, 0.9))];
@@ -50,9 +50,9 @@ fn label(random: &mut Random, volume: &Volume, scene: &mut Scene) -> Volume {
         };
         BTreeMap::from([(1, shown), (2, LabelTables { visible: false, ..LabelTables::default() })])
     };
-    scene.transfer.labels = tables();
-    scene.further[0].transfer.labels = tables();
-    labelled(&channels[0], 5).with_channels("test", further).unwrap()
+    scene.channels[0].transfer.labels = tables();
+    scene.channels[1].transfer.labels = tables();
+    labelled(&channels[0], 5).with_channels("test", others).unwrap()
 }
 
 #[test]
@@ -129,8 +129,8 @@ fn culling_keeps_its_guarantee_over_sums() {
         scene.splatting.compositing = [Compositing::Linear, Compositing::Exponential][round / 2 % 2];
         // Opaque together, though not each alone.
         let faint = vec![(20.0, 0.0), (60.0, 0.35)];
-        scene.transfer.opacity = Some(Ramp::new(faint.clone()).unwrap());
-        for channel in &mut scene.further {
+        scene.channels[0].transfer.opacity = Some(Ramp::new(faint.clone()).unwrap());
+        for channel in &mut scene.channels[1..] {
             channel.transfer.opacity = Some(Ramp::new(faint.clone()).unwrap());
         }
         let whole = draw(Backend::Cpu, &volume, &scene);

@@ -34,7 +34,7 @@ fn colored(random: &mut Random, spacing: DVec3) -> (Volume, Scene) {
     let mut scene = scene(40, 36);
     scene.camera = camera(random.direction().to_array(), 22.0);
     scene.splatting.culling = false;
-    scene.transfer = transfer(&[(0.0, [1.0, 0.0, 0.0])], &[(20.0, 0.0), (140.0, 0.7)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0, 0.0, 0.0])], &[(20.0, 0.0), (140.0, 0.7)]);
     (volume, scene)
 }
 
@@ -126,7 +126,7 @@ fn the_gpu_draws_colours_of_any_channel() {
         let channels = vec![first.clone(), plain(&first, 0.8), second.clone()];
         let volume = plain(&second, 0.9).with_channels("test", channels).unwrap();
         let faint = |color| transfer(&[(0.0, color)], &[(20.0, 0.0), (140.0, 0.3)]);
-        let own = scene.transfer.clone();
+        let own = scene.channels[0].transfer.clone();
         let transfers = [faint([0.1, 0.9, 0.2]), own.clone(), faint([0.9, 0.1, 0.8]), own];
         super::set_transfers(&mut scene, &transfers);
         scene.splatting = Splatting { classification, compositing, ..scene.splatting };
@@ -146,7 +146,7 @@ fn gray_colours_are_a_volume_of_values() {
     let dims = colored.dims();
     let grays = Volume::from_colors("grays", dims, DVec3::ONE, (&grays, SampleType::U8)).unwrap();
     let plain = Volume::new("values", dims, DVec3::ONE, values).unwrap();
-    scene.transfer = transfer(&[(0.0, [0.0; 3]), (255.0, [1.0; 3])], &[(20.0, 0.0), (140.0, 0.7)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [0.0; 3]), (255.0, [1.0; 3])], &[(20.0, 0.0), (140.0, 0.7)]);
     for (classification, backend) in CLASSIFICATIONS.into_iter().flat_map(|c| NATIVE.map(|backend| (c, backend))) {
         scene.splatting.classification = classification;
         let [a, b] = [&grays, &plain].map(|volume| draw(backend, volume, &scene).image);
@@ -174,7 +174,7 @@ fn alpha_is_a_factor_of_opacity() {
     for (classification, backend) in CLASSIFICATIONS.into_iter().flat_map(|c| NATIVE.map(|backend| (c, backend))) {
         scene.splatting.classification = classification;
         let mut image = |volume: &Volume, transfer: &sheetsplat::scene::TransferSettings| {
-            scene.transfer = transfer.clone();
+            scene.channels[0].transfer = transfer.clone();
             draw(backend, volume, &scene).image
         };
         let (expected, actual) = (image(&with_alpha(255.0), &faint), image(&with_alpha(51.0), &strong));

@@ -169,7 +169,7 @@ fn the_preset_fusion_shows_both() {
     write(&folder.path().join("pet.nrrd"), UVec3::new(11, 13, 9), (DVec3::ZERO, steps), glow);
     let volume = scene.load_volume().unwrap();
     let transfer = scene.resolve(&volume);
-    let gray = transfer.color.at(100.0);
+    let gray = transfer[0].color.at(100.0);
     assert!(gray.x == gray.y && gray.y == gray.z && gray.x > 0.5, "{gray}");
     let middle = 48 * 24 + 24;
     let image = |scene: &Scene| super::draw(Backend::Cpu, &volume, scene).image;
@@ -178,7 +178,7 @@ fn the_preset_fusion_shows_both() {
     assert!(red > 0.25 && red > blue + 0.15, "the glow is seen through the ball: {red} {blue}");
     let is_gray = |pixel: &&[f32; 4]| pixel[0] > 0.08 && (pixel[0] - pixel[2]).abs() < 0.02;
     assert!(both.pixels.iter().filter(is_gray).count() > 100, "the ball is seen around it");
-    scene.further[0].visible = false;
+    scene.channels[1].visible = false;
     let ball = image(&scene).pixels;
     let [red, green, blue, _] = ball[middle];
     assert!(red == green && green == blue && red > 0.1, "{red} {green} {blue}");

@@ -168,7 +168,8 @@ fn labels_of_every_channel_have_their_tables() {
             opacity: Some(Ramp::new(vec![(40.0, 0.0), (160.0, 0.9)]).unwrap()),
             ..LabelTables::default()
         };
-        let mut transfers: Vec<TransferSettings> = scene.channels().map(|channel| channel.transfer.clone()).collect();
+        let mut transfers: Vec<TransferSettings> =
+            scene.channels.iter().map(|channel| channel.transfer.clone()).collect();
         transfers[2].labels = BTreeMap::from([(0, hidden.clone()), (1, bright.clone())]);
         if round % 2 == 0 {
             transfers[0].labels = BTreeMap::from([(1, hidden), (2, bright)]);
@@ -194,7 +195,7 @@ fn neither_order_nor_empty_channels_matter() {
         (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
         let scene = scene.explicit(&volume);
         let channels: Vec<_> = volume.channels().collect();
-        let settings: Vec<_> = scene.channels().map(|channel| channel.transfer.clone()).collect();
+        let settings: Vec<_> = scene.channels.iter().map(|channel| channel.transfer.clone()).collect();
         let image = |rasterizer, order: &[usize]| {
             let mut scene = by(rasterizer, &scene);
             let transfers: Vec<_> = order.iter().map(|&number| settings[number].clone()).collect();
@@ -210,7 +211,7 @@ fn neither_order_nor_empty_channels_matter() {
             let allowed = if are_rounded && BY_SUMS.contains(&compositing) { 1e-3 } else { 1e-6 };
             assert_at_most(distance, allowed, format!("{classification:?} {compositing:?} by {rasterizer:?}"));
             let mut hidden = by(rasterizer, &scene);
-            hidden.further[1].visible = false;
+            hidden.channels[2].visible = false;
             let hidden = gpu.render_volume(volume.clone(), &hidden).unwrap().image;
             assert_eq!(hidden, image(rasterizer, &[0, 1]), "{classification:?} {compositing:?} by {rasterizer:?}");
         }
@@ -226,7 +227,7 @@ fn a_channel_without_opacity_changes_nothing() {
         let (volume, mut scene) = random_case(&mut random, 2);
         (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
         let mut scene = scene.explicit(&volume);
-        let second = scene.further[0].transfer.clone();
+        let second = scene.channels[1].transfer.clone();
         let nothing = transfer(&[(0.0, [0.9, 0.1, 0.1])], &[(0.0, 0.0), (250.0, 0.0)]);
         set_transfers(&mut scene, &[nothing, second.clone()]);
         for rasterizer in RASTERIZERS {
@@ -327,7 +328,7 @@ fn a_changed_view_is_drawn_as_a_new_one() {
             1 => scene.splatting.classification = random.pick(&CLASSIFICATIONS),
             _ => {
                 let low = random.uniform(20.0, 90.0);
-                scene.further[0].transfer = transfer(&[(0.0, [0.1, 0.9, 0.4])], &[(low, 0.0), (low + 60.0, 0.8)]);
+                scene.channels[1].transfer = transfer(&[(0.0, [0.1, 0.9, 0.4])], &[(low, 0.0), (low + 60.0, 0.8)]);
                 let change = view.set_transfer_function(scene.resolve(&volume)).unwrap();
                 touched += u64::from(change.entered + change.left > 0);
             }
@@ -406,7 +407,7 @@ fn four_channels(random: &mut Random) -> (Volume, Scene) {
 fn first_channels(volume: &Volume, scene: &Scene, count: usize) -> (Volume, Scene) {
     let channels: Vec<&Volume> = volume.channels().take(count).collect();
     let mut scene = scene.clone();
-    scene.further.truncate(count - 1);
+    scene.channels.truncate(count);
     (joined(&channels), scene)
 }
 

@@ -50,7 +50,7 @@ fn the_order_of_channels_does_not_matter() {
         let (volume, mut scene) = random_case(&mut random, 3);
         (scene.splatting.classification, scene.splatting.compositing) = (classification, compositing);
         let channels: Vec<_> = volume.channels().collect();
-        let settings: Vec<_> = scene.channels().map(|channel| channel.transfer.clone()).collect();
+        let settings: Vec<_> = scene.channels.iter().map(|channel| channel.transfer.clone()).collect();
         let images = |backend: Backend| {
             [[0, 1, 2], [2, 0, 1], [1, 0, 2]].map(|order| {
                 let mut scene = scene.clone();
@@ -78,7 +78,7 @@ fn what_opaque_sums_hide_is_culled() {
         let (volume, mut scene) = random_case(&mut random, 3);
         scene.splatting.classification = classification;
         scene.splatting.compositing = Compositing::Exponential;
-        for channel in &mut scene.further {
+        for channel in &mut scene.channels[1..] {
             channel.transfer.gradient_opacity = None;
         }
         let whole = draw(Backend::Cpu, &volume, &scene);
@@ -103,9 +103,9 @@ fn a_changed_scene_of_several_channels_is_drawn_as_a_new_one() {
     for step in 0..24 {
         match step % 4 {
             0 => scene.splatting.compositing = random.pick(&COMPOSITINGS),
-            1 => scene.further[0].visible = !scene.further[0].visible,
+            1 => scene.channels[1].visible = !scene.channels[1].visible,
             2 => scene.splatting.classification = random.pick(&CLASSIFICATIONS),
-            _ => scene.further[1].transfer.iso_ranges = Some(vec![[random.uniform(0.0, 100.0), 200.0]]),
+            _ => scene.channels[2].transfer.iso_ranges = Some(vec![[random.uniform(0.0, 100.0), 200.0]]),
         }
         renderer.set_scene(&scene).unwrap();
         assert_eq!(renderer.draw().unwrap().image, draw(Backend::Cpu, &volume, &scene).image, "step {step}");

@@ -13,7 +13,7 @@ use glam::UVec3;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions, Rendering};
 use sheetsplat::scene::{Channel, Scene, TransferSettings, VolumeSource};
 use sheetsplat::settings::{Classification, Compositing, Projection};
-use sheetsplat::volume::Volume;
+use sheetsplat::volume::{Channels, Volume};
 
 use crate::common::{Random, SPACINGS, random_eye, random_volume, scene, transfer};
 
@@ -34,14 +34,13 @@ fn channel(transfer: TransferSettings) -> Channel {
 
 /// Gives a scene transfer functions for all channels.
 fn set_transfers(scene: &mut Scene, transfers: &[TransferSettings]) {
-    scene.transfer = transfers[0].clone();
-    scene.further = transfers[1..].iter().cloned().map(channel).collect();
+    scene.channels = Channels::of(transfers.iter().cloned().map(channel)).unwrap();
 }
 
 /// A volume of the channels in another order.
 fn joined(channels: &[&Volume]) -> Volume {
-    let further = channels[1..].iter().map(|channel| single(channel)).collect();
-    single(channels[0]).with_channels("test", further).unwrap()
+    let others = channels[1..].iter().map(|channel| single(channel)).collect();
+    single(channels[0]).with_channels("test", others).unwrap()
 }
 
 /// A channel by itself.
@@ -55,7 +54,7 @@ fn random_case(random: &mut Random, count: usize) -> (Volume, Scene) {
     let spacing = random.pick(&SPACINGS);
     let first = random_volume(random, (8.0, 15.0), spacing);
     let (dims, spacing) = (first.dims(), first.spacing());
-    let further = (1..count).map(|_| {
+    let others = (1..count).map(|_| {
         let values = (0..dims.element_product()).map(|index| {
             let voxel = UVec3::new(index % dims.x, index / dims.x % dims.y, index / dims.x / dims.y).as_dvec3();
             let wave = ((voxel * 0.7).element_sum() + random.uniform(0.0, 0.4)).sin();
@@ -63,7 +62,7 @@ fn random_case(random: &mut Random, count: usize) -> (Volume, Scene) {
         });
         Volume::new("waves", dims, spacing, values.collect()).unwrap()
     });
-    let volume = first.with_channels("test", further.collect()).unwrap();
+    let volume = first.with_channels("test", others.collect()).unwrap();
     let mut scene = scene(random.uniform(24.0, 40.0) as u32, random.uniform(24.0, 40.0) as u32);
     scene.camera.direction = random.direction();
     scene.camera.up = random.direction();

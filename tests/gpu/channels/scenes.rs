@@ -42,7 +42,7 @@ fn refusal(text: &str, sets: &[&str]) -> String {
 #[test]
 fn every_key_of_a_channel() {
     let scene = parse(TWO, &[]).unwrap();
-    let channels: Vec<_> = scene.channels().collect();
+    let channels: Vec<_> = scene.channels.iter().collect();
     assert_eq!(channels.len(), 2);
     assert_eq!((channels[0].name.as_deref(), channels[0].visible), (Some("skull"), true));
     assert_eq!((channels[1].name.as_deref(), channels[1].visible), (None, false));
@@ -63,22 +63,22 @@ fn every_key_of_a_channel() {
 fn overrides_of_channels() {
     let sets = ["channel[1].visible=true", "channel[0].transfer.opacity=[[5, 1]]", "channel[1].volume.builtin=cube:16"];
     let scene = parse(TWO, &sets).unwrap();
-    assert!(scene.further[0].visible);
-    assert_eq!(scene.transfer.opacity.as_ref().unwrap().points(), [(5.0, 1.0)]);
-    assert_eq!(scene.further[0].volume, VolumeSource::Builtin("cube:16".to_owned()));
+    assert!(scene.channels[1].visible);
+    assert_eq!(scene.channels[0].transfer.opacity.as_ref().unwrap().points(), [(5.0, 1.0)]);
+    assert_eq!(scene.channels[1].volume, VolumeSource::Builtin("cube:16".to_owned()));
     let path = parse(TWO, &["channel[1].volume.path=b.nrrd"]).unwrap();
-    assert_eq!(path.further[0].volume.path(), Some(Path::new("folder/b.nrrd")));
+    assert_eq!(path.channels[1].volume.path(), Some(Path::new("folder/b.nrrd")));
     // A volume whose channels have no tables gets them.
     let source = VolumeSource::Builtin("head:16".to_owned());
     let bare = Scene::from_volume(source, &["channel[1].visible=false".to_owned()]).unwrap();
-    assert_eq!((bare.visible, bare.further[0].visible), (true, false));
-    assert_eq!(bare.further[0].volume, VolumeSource::Memory);
+    assert_eq!((bare.channels[0].visible, bare.channels[1].visible), (true, false));
+    assert_eq!(bare.channels[1].volume, VolumeSource::Memory);
     // A scene of one channel becomes one of several.
     let one = "volume.path = 'a.nrrd'\ntransfer.opacity = [[0, 1]]";
     let scene = parse(one, &["channel[1].transfer.opacity=[[0, 0.5]]"]).unwrap();
-    assert_eq!(scene.volume.path(), Some(Path::new("folder/a.nrrd")));
-    assert_eq!(scene.transfer.opacity.as_ref().unwrap().points(), [(0.0, 1.0)]);
-    assert_eq!(scene.further[0].transfer.opacity.as_ref().unwrap().points(), [(0.0, 0.5)]);
+    assert_eq!(scene.channels[0].volume.path(), Some(Path::new("folder/a.nrrd")));
+    assert_eq!(scene.channels[0].transfer.opacity.as_ref().unwrap().points(), [(0.0, 1.0)]);
+    assert_eq!(scene.channels[1].transfer.opacity.as_ref().unwrap().points(), [(0.0, 0.5)]);
 }
 
 #[test]
@@ -163,7 +163,7 @@ fn saved_scenes_are_read_back() {
     let explicit = scene.explicit(&volume);
     let again = Scene::parse(&explicit.to_toml(Path::new("")).unwrap(), "saved", Path::new(""), &[]).unwrap();
     assert_eq!(again, explicit);
-    assert!(!again.further[0].visible);
+    assert!(!again.channels[1].visible);
 }
 
 #[test]
@@ -175,8 +175,8 @@ fn saved_scenes_of_files_with_channels_are_read_back() {
     let volume = scene.load_volume().unwrap();
     let explicit = scene.explicit(&volume);
     // The first table alone says which file, time and spacing.
-    assert_eq!((explicit.time, explicit.further[0].time), (Some(1), None));
-    assert_eq!((explicit.spacing, explicit.further[0].spacing), (Some(DVec3::new(1.0, 2.0, 3.0)), None));
+    assert_eq!((explicit.channels[0].time, explicit.channels[1].time), (Some(1), None));
+    assert_eq!((explicit.channels[0].spacing, explicit.channels[1].spacing), (Some(DVec3::new(1.0, 2.0, 3.0)), None));
     let saved = explicit.to_toml(Path::new("")).unwrap();
     let again = Scene::parse(&saved, "saved", Path::new(""), &[]).unwrap_or_else(|error| panic!("{error}\n{saved}"));
     assert_eq!(again, explicit);
@@ -238,9 +238,9 @@ fn channels_have_windows_and_colours_of_their_own() {
     // The convention: each channel's opacity rises over its own values.
     for sets in [&[][..], &["preset=confocal"]] {
         let transfer = resolved(&volume, sets);
-        let colors: Vec<_> = transfer.channels().map(|of| of.color.at(100.0)).collect();
+        let colors: Vec<_> = transfer.iter().map(|of| of.color.at(100.0)).collect();
         assert_eq!(colors, [DVec3::new(1.0, 0.0, 1.0), DVec3::Y]);
-        let windows: Vec<_> = transfer.channels().map(|of| of.opacity.points().to_vec()).collect();
+        let windows: Vec<_> = transfer.iter().map(|of| of.opacity.points().to_vec()).collect();
         assert!(windows.iter().all(|points| points.len() == 2 && points[0].1 == 0.0), "{windows:?}");
         assert_ne!(windows[0], windows[1]);
     }
@@ -250,18 +250,18 @@ fn channels_have_windows_and_colours_of_their_own() {
     volume = volume.with_display(Some(display));
     for sets in [&[][..], &["preset=confocal"]] {
         let transfer = resolved(&volume, sets);
-        let [start, top] = *transfer.opacity.points() else { panic!("{transfer:?}") };
+        let [start, top] = *transfer[0].opacity.points() else { panic!("{transfer:?}") };
         assert_eq!((start, top.0), ((20.0, 0.0), 70.0));
         // The mean ray through the volume meets an optical depth of 0.4, unless that takes more than half.
         let shares = volume.values().iter().map(|value| ((f64::from(value) - 20.0) / 50.0).clamp(0.0, 1.0));
         let mean = shares.sum::<f64>() / volume.values().len() as f64;
         let extent = (volume.dims().as_dvec3() * volume.grid().aspect()).element_sum() / 3.0;
         assert!((top.1 - (0.4 / (mean * extent)).min(0.5)).abs() < 1e-3, "{top:?}");
-        assert_eq!([20.0, 70.0].map(|value| transfer.color.at(value)), [DVec3::X, DVec3::Z]);
-        assert_eq!(transfer.further[0].color.at(0.0), DVec3::Y);
+        assert_eq!([20.0, 70.0].map(|value| transfer[0].color.at(value)), [DVec3::X, DVec3::Z]);
+        assert_eq!(transfer[1].color.at(0.0), DVec3::Y);
         let stated = resolved(&volume, &[sets, &["transfer.color=[[0,[0,1,1]]]"]].concat());
-        assert_eq!(stated.color.at(20.0), DVec3::new(0.0, 1.0, 1.0));
+        assert_eq!(stated[0].color.at(20.0), DVec3::new(0.0, 1.0, 1.0));
     }
     let alone = super::single(&volume);
-    assert_eq!(resolved(&alone, &["preset=confocal"]).opacity.points(), [(20.0, 0.0), (70.0, 0.5)]);
+    assert_eq!(resolved(&alone, &["preset=confocal"])[0].opacity.points(), [(20.0, 0.0), (70.0, 0.5)]);
 }

@@ -96,23 +96,23 @@ fn labels_among_channels_keep_their_colours() {
         let volume = scene.load_volume().unwrap();
         let transfer = scene.resolve(&volume);
         for label in [3, 40, 700] {
-            let of_label = &transfer.further[0];
+            let of_label = &transfer[1];
             assert_eq!(of_label.color.at(label.into()), categories::color(label), "{keys} {label}");
             assert!(of_label.opacity.at(label.into()) >= 0.3 && of_label.opacity.at(0.0) == 0.0, "{keys} {label}");
         }
         assert_eq!(scene.classification(&volume), Classification::Before, "{keys}");
-        assert_ne!(transfer.color, transfer.further[0].color, "{keys}");
+        assert_ne!(transfer[0].color, transfer[1].color, "{keys}");
         // A stated colour goes before it, and so does a stated opacity.
         let mut stated = scene.clone();
-        stated.further[0].transfer = crate::common::transfer(&[(0.0, [0.0, 1.0, 0.0])], &[(0.0, 0.0), (1.0, 0.125)]);
-        stated.further[0].transfer.preset = scene.transfer.preset;
+        stated.channels[1].transfer = crate::common::transfer(&[(0.0, [0.0, 1.0, 0.0])], &[(0.0, 0.0), (1.0, 0.125)]);
+        stated.channels[1].transfer.preset = scene.channels[0].transfer.preset;
         let transfer = stated.resolve(&volume);
-        assert_eq!((transfer.further[0].color.at(40.0), transfer.further[0].opacity.at(40.0)), (DVec3::Y, 0.125));
+        assert_eq!((transfer[1].color.at(40.0), transfer[1].opacity.at(40.0)), (DVec3::Y, 0.125));
     }
     // Alone, the label map looks as it does among channels.
     let mut shown =
         scene(folder.path(), "shading.enabled = false\ncamera = {direction = [0, 0, 1], up = [0, 1, 0]}", label);
-    shown.visible = false;
+    shown.channels[0].visible = false;
     let volume = shown.load_volume().unwrap();
     let image = draw(Backend::Cpu, &volume, &shown).image;
     for label in [3, 40, 700] {
@@ -126,7 +126,7 @@ fn labels_among_channels_keep_their_colours() {
     // In projections, numbers are amounts.
     let projected = scene(folder.path(), "preset = 'mip'", label);
     let transfer = projected.resolve(&projected.load_volume().unwrap());
-    assert_eq!(transfer.further[0].color.at(40.0), DVec3::Y);
+    assert_eq!(transfer[1].color.at(40.0), DVec3::Y);
 }
 
 #[test]
@@ -153,7 +153,7 @@ fn labels_of_a_volume_on_another_grid_follow_it() {
     let folder = tempfile::tempdir().unwrap();
     let mut scene = scene(folder.path(), "", |place| place.x + 2.0 * place.y + 0.1);
     write(&folder.path().join("labels.nrrd"), OTHER, (ORIGIN, STEPS), label);
-    scene.further[0].labels = Some(folder.path().join("labels.nrrd"));
+    scene.channels[1].labels = Some(folder.path().join("labels.nrrd"));
     let volume = scene.load_volume().unwrap();
     let labels = volume.channel(1).unwrap().labels().unwrap();
     let mut inside = 0;

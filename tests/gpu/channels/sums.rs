@@ -14,9 +14,8 @@ use crate::common::{COMPOSITINGS, Random, transfer};
 /// The image of one channel of a scene, seen by the same camera.
 fn of_channel(backend: Backend, volume: &Volume, scene: &Scene, number: usize) -> Image {
     let mut scene = scene.explicit(volume);
-    let transfer = scene.channels().nth(number).unwrap().transfer.clone();
-    scene.transfer = transfer;
-    scene.further.clear();
+    scene.channels.swap(0, number);
+    scene.channels.truncate(1);
     draw(backend, &single(volume.channel(number).unwrap()), &scene).image
 }
 
@@ -30,7 +29,7 @@ fn projections_of_channels_are_sums() {
             scene.image.background = [0.0; 4];
             // Sums that stay below 1.
             let mut channels: Vec<TransferSettings> =
-                scene.channels().map(|channel| channel.transfer.clone()).collect();
+                scene.channels.iter().map(|channel| channel.transfer.clone()).collect();
             for transfer in &mut channels {
                 let faint = transfer.opacity.iter().flat_map(|ramp| ramp.points()).map(|&(at, y)| (at, y * 0.02));
                 transfer.opacity = Some(Ramp::new(faint.collect()).unwrap());
@@ -63,14 +62,14 @@ fn a_channel_that_shows_nothing_changes_nothing() {
         for backend in NATIVE {
             let alone = of_channel(backend, &volume, &scene, 0);
             let mut hidden = scene.clone();
-            hidden.further[0].visible = false;
+            hidden.channels[1].visible = false;
             assert_eq!(draw(backend, &volume, &hidden).image, alone, "{backend} {classification:?} {compositing:?}");
             let mut transparent = scene.clone();
-            transparent.further[0].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
+            transparent.channels[1].transfer.opacity = Some(Ramp::new(vec![(0.0, 0.0)]).unwrap());
             assert_eq!(draw(backend, &volume, &transparent).image, alone, "{classification:?} {compositing:?}");
             // The first channel, too.
             let mut second = scene.clone();
-            second.visible = false;
+            second.channels[0].visible = false;
             let expected = of_channel(backend, &volume, &scene, 1);
             assert_eq!(draw(backend, &volume, &second).image, expected, "{classification:?} {compositing:?}");
         }
@@ -82,7 +81,7 @@ pub(super) fn split(random: &mut Random, round: usize, compositing: Compositing)
     let (volume, mut scene) = random_case(random, 1);
     scene.shading.enabled = false;
     scene.splatting.compositing = compositing;
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(0.0, [0.2, 0.4, 1.0]), (200.0, [1.0, 0.5, 0.0])],
         &[(10.0, 0.0), (200.0, 0.3 + 0.2 * round as f64)],
     );
@@ -97,7 +96,7 @@ pub(super) fn split(random: &mut Random, round: usize, compositing: Compositing)
     };
     let halves = joined(&[&half(true), &half(false)]);
     let mut split = scene.clone();
-    set_transfers(&mut split, &[scene.transfer.clone(), scene.transfer.clone()]);
+    set_transfers(&mut split, &[scene.channels[0].transfer.clone(), scene.channels[0].transfer.clone()]);
     [(volume, scene), (halves, split)]
 }
 

@@ -122,7 +122,7 @@ fn the_minimum_across_a_gap_is_empty() {
         let volume = Volume::new("gap", volume.grid().dims, DVec3::ONE, values).unwrap();
         (scene.splatting.radius, scene.splatting.falloff) = (1.5, 2.0);
         scene.splatting.compositing = Compositing::Minimum;
-        scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
+        scene.channels[0].transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
         scene.camera = camera([0.0, 1.0, 0.0], 20.0);
         for (drawing, order) in DRAWINGS
             .into_iter()
@@ -155,7 +155,7 @@ fn the_minimum_across_empty_groups_is_empty() {
         scene.camera = camera([0.0, 1.0, 0.0], 4.0);
         (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
         (scene.splatting.compositing, scene.splatting.slab_width) = (Compositing::Minimum, 8.0);
-        scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
+        scene.channels[0].transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.0), (1.0, OPACITY)]);
         for (drawing, order) in DRAWINGS
             .into_iter()
             .flat_map(|drawing| [Order::FrontToBack, Order::BackToFront].map(|order| (drawing, order)))
@@ -189,7 +189,7 @@ fn maximum_and_average_are_the_same_from_behind() {
             scene.splatting.compositing = compositing;
             scene.splatting.slab_width = width;
             scene.shading.enabled = false;
-            scene.transfer = transfer(&[(0.0, [1.0, 0.7, 0.4])], &[(0.0, 0.0), (255.0, 1.0)]);
+            scene.channels[0].transfer = transfer(&[(0.0, [1.0, 0.7, 0.4])], &[(0.0, 0.0), (255.0, 1.0)]);
             let [front, behind] = [direction, -direction].map(|direction| {
                 scene.camera.direction = direction;
                 render(drawing, gpu, &volume, &scene).0

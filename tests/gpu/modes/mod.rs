@@ -47,7 +47,7 @@ pub(crate) fn random_case(random: &mut Random) -> (Volume, Scene) {
     let (haze, solid) = (random.pick(&[0.0, 0.02, 0.3]), random.pick(&[0.3, 0.9, 1.0]));
     // Transparent voxels leave gaps.
     let opacity = [(10.0, 0.0), (20.0, haze), (200.0, solid)];
-    scene.transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
+    scene.channels[0].transfer = transfer(&[(0.0, [0.2, 0.5, 1.0]), (200.0, [1.0, 0.9, 0.8])], &opacity);
     scene.splatting.slab_width = random.pick(&[0.5, 1.0, 2.0, 3.0]);
     scene.splatting.radius = random.pick(&[1.4, 2.0, 2.7]);
     scene.splatting.culling = false;
@@ -130,6 +130,6 @@ pub(crate) fn constant(dims: [u32; 3], spacing: DVec3) -> (Volume, Scene) {
     (scene.splatting.radius, scene.splatting.falloff) = (3.0, 1.0);
     scene.shading.enabled = false;
     scene.image.background = [0.0; 4];
-    scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, OPACITY)]);
+    scene.channels[0].transfer = transfer(&[(0.0, COLOR)], &[(0.0, OPACITY)]);
     (volume, scene)
 }

@@ -20,7 +20,7 @@ fn step(opacity: f64) -> (Volume, Scene) {
     scene.camera = camera([0.2, 1.0, -0.3], 12.0);
     (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
     scene.splatting.compositing = Compositing::Surface;
-    scene.transfer = transfer(&[(0.0, [1.0, 0.0, 0.0]), (1.0, COLOR)], &[(0.0, 0.0), (1.0, opacity)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0, 0.0, 0.0]), (1.0, COLOR)], &[(0.0, 0.0), (1.0, opacity)]);
     (volume, scene)
 }
 
@@ -75,9 +75,9 @@ fn haze_before_a_gap_does_not_colour_a_surface() {
     scene.camera = camera([0.0, 1.0, 0.0], 4.0);
     (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
     (scene.splatting.compositing, scene.splatting.slab_width) = (Compositing::Surface, 8.0);
-    scene.transfer =
+    scene.channels[0].transfer =
         transfer(&[(1.0, [1.0, 0.0, 0.0]), (2.0, [0.0, 0.0, 1.0])], &[(0.0, 0.0), (1.0, 0.45), (2.0, 0.9)]);
-    let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+    let expected = reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
     for (drawing, tiles) in DRAWINGS.into_iter().flat_map(|drawing| [true, false].map(|tiles| (drawing, tiles))) {
         scene.splatting.tiles = tiles;
         for pixels in [&expected, &render(drawing, gpu, &volume, &scene).0].map(|image| &image.pixels) {
@@ -100,7 +100,7 @@ fn a_surface_has_no_rings() {
         let mut scene = scene(128, 128);
         scene.camera.direction = DVec3::from(direction);
         scene.splatting.compositing = Compositing::Surface;
-        scene.transfer =
+        scene.channels[0].transfer =
             transfer(&[(20.0, [0.9, 0.3, 0.2]), (110.0, [0.8, 0.75, 0.3]), (200.0, [0.3, 0.5, 1.0])], &opacity);
         scene.image.background = [0.0; 4];
         for drawing in DRAWINGS {

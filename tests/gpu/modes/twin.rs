@@ -45,7 +45,8 @@ fn any_view_equals_the_reference() {
             let depths = walls.then(|| wall(&view_of(&volume, &scene)));
             let host = Host { surfaces: depths.as_deref(), first_hit };
             let expected =
-                reference::render_for(host, &volume, &scene.transfer.resolve(&volume), &scene, None).unwrap();
+                reference::render_for(host, &volume, &[scene.channels[0].transfer.resolve(&volume)], &scene, None)
+                    .unwrap();
             let background = expected.image.pixels.iter().filter(|pixel| {
                 let [r, g, b, a] = scene.image.background;
                 **pixel == [r * a, g * a, b * a, a].map(|channel| channel as f32)
@@ -96,12 +97,12 @@ fn thin_volumes() {
                 .map(move |method| (compositing, method))
         }) {
             let (volume, mut scene) = constant(dims, DVec3::ONE);
-            scene.transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.9)]);
+            scene.channels[0].transfer = transfer(&[(0.0, COLOR)], &[(0.0, 0.9)]);
             scene.camera = camera(direction.to_array(), 3.0);
             scene.camera.up = DVec3::new(0.0, 0.6, 0.8);
             (scene.splatting.compositing, scene.splatting.method) = (compositing, method);
             (scene.splatting.radius, scene.splatting.falloff) = (2.0, 2.0);
-            let expected = reference::render(&volume, &scene.transfer.resolve(&volume), &scene).unwrap();
+            let expected = reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).unwrap();
             for drawing in DRAWINGS {
                 let image = render(drawing, gpu, &volume, &scene).0;
                 let what = format!("{dims:?} {direction} {compositing:?} {method:?} {drawing:?}");
@@ -147,12 +148,12 @@ fn settings_that_exclude_each_other_are_refused() {
         (scene.splatting.compositing, scene.splatting.method) = (compositing, Method::CompositeEverySample);
         let name = format!("\"{}\"", format!("{compositing:?}").to_lowercase());
         assert_words(&refusal(&scene, None), &[&name, "composite-every-sample", "\"linear\""]);
-        assert!(reference::render(&volume, &scene.transfer.resolve(&volume), &scene).is_err());
+        assert!(reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).is_err());
     }
     let mut scene = scene(20, 20);
     (scene.splatting.compositing, scene.splatting.order) = (Compositing::Surface, Order::BackToFront);
     assert_words(&refusal(&scene, None), &["\"surface\"", "back-to-front", "\"front-to-back\""]);
-    assert!(reference::render(&volume, &scene.transfer.resolve(&volume), &scene).is_err());
+    assert!(reference::render(&volume, &[scene.channels[0].transfer.resolve(&volume)], &scene).is_err());
     scene.splatting.compositing = Compositing::Minimum;
     assert_words(&refusal(&scene, Some(0.5)), &["\"minimum\" with first hits"]);
 }

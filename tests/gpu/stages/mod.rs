@@ -57,7 +57,6 @@ fn frame_over(grid: &Grid, scene: &Scene) -> Frame {
         iso_ranges: None,
         membership: false,
         labels: BTreeMap::new(),
-        further: Vec::new(),
     });
     uniforms::frame(&view, &kernel, (grid, ValueFormat::Bits), &ramps, scene)
 }

@@ -39,7 +39,7 @@ fn skin() -> TransferSettings {
 }
 
 fn oblique() -> Scene {
-    Scene { camera: camera([0.3, 0.9, -0.2], 40.0), transfer: skin(), ..scene(64, 48) }
+    Scene { camera: camera([0.3, 0.9, -0.2], 40.0), ..scene(64, 48) }.with_transfer(skin())
 }
 
 /// The f32 error of a ramp's value: the control points and the position are rounded and subtracted, in the segment's own units; ordinates,
@@ -129,13 +129,13 @@ fn check(name: &str, volume: &Volume, scene: &Scene) {
 
 /// Like [`check`]; returns the number of shaded voxels.
 fn shaded(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) -> usize {
-    let transfer = scene.transfer.resolve(volume);
+    let transfer = scene.channels[0].transfer.resolve(volume);
     let mut scene = scene.clone();
     scene.splatting.culling = false;
     let scene = &scene;
     let sheets = 2;
     let stage = Cull::new(gpu.device(), sheets);
-    let voxels = classify(volume, &transfer, &ClippedVoxels::default());
+    let voxels = classify(volume, std::slice::from_ref(&transfer), &ClippedVoxels::default());
     let labels = volume.labels().filter(|_| transfer.labels.values().any(LabelTables::matter_to_shading));
     let of_volume = (volume.grid(), volume.values(), labels);
     let culling = Culling::new(gpu, (&stage, Groups::Sheets(sheets)), of_volume, &voxels, &transfer, scene);
@@ -144,8 +144,8 @@ fn shaded(gpu: &GpuHeadless, name: &str, volume: &Volume, scene: &Scene) -> usiz
     let (records, states, view) = (culling.splats(), culling.states(), culling.view);
 
     let geometry = Geometry::new(volume.grid(), scene).unwrap();
-    let taking_part = shading::taking_part(volume, &transfer, &geometry);
-    let expected = shading::shade(volume, &transfer, scene, &geometry).unwrap();
+    let taking_part = shading::taking_part(volume, std::slice::from_ref(&transfer), &geometry);
+    let expected = shading::shade(volume, std::slice::from_ref(&transfer), scene, &geometry).unwrap();
     let twins: BTreeMap<u32, &shading::Splat> = taking_part.iter().copied().zip(&expected).collect();
     let held: usize = culling.bricks.iter().map(|brick| brick::voxels(brick).count()).sum();
     assert_eq!(held, voxels.len(), "{name}: bricks hold every voxel");
@@ -327,21 +327,18 @@ fn extreme_values_and_spacings() {
         // Values have both signs, so differences are up to twice as large.
         let values = (0..DIMS.element_product()).map(|_| (value * random.uniform(-300.0, 300.0)) as f32).collect();
         let volume = Volume::new("extreme", DIMS, spacing, values).unwrap();
-        let mut scene = Scene {
-            camera: camera([0.3, 0.9, -0.2], 40.0 * spacing.min_element()),
-            transfer: transfer(
-                &[(-200.0 * value, [0.1, 0.3, 0.9]), (250.0 * value, [1.0, 0.8, 0.6])],
-                &[(-300.0 * value, 0.1), (100.0 * value, 0.3), (200.0 * value, 1.0)],
-            ),
-            ..scene(64, 48)
-        };
+        let camera = camera([0.3, 0.9, -0.2], 40.0 * spacing.min_element());
+        let mut scene = Scene { camera, ..scene(64, 48) }.with_transfer(transfer(
+            &[(-200.0 * value, [0.1, 0.3, 0.9]), (250.0 * value, [1.0, 0.8, 0.6])],
+            &[(-300.0 * value, 0.1), (100.0 * value, 0.3), (200.0 * value, 1.0)],
+        ));
         let name = format!("values {value:e}, spacing {spacing:?}");
         check(&name, &volume, &scene);
         // Where f32 can represent the gradients, their opacity is tested, too.
         let gradient = 300.0 * value / spacing.min_element();
         if (1e-11..1e37).contains(&gradient) {
             let points = vec![(0.1 * gradient, 0.2), (0.5 * gradient, 0.9), (0.8 * gradient, 0.4)];
-            scene.transfer.gradient_opacity = Some(Ramp::new(points).unwrap());
+            scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(points).unwrap());
             check(&format!("{name}, gradient opacity"), &volume, &scene);
         }
     }
@@ -367,7 +364,7 @@ fn values_in_several_layers() {
         let mut scene = oblique();
         scene.camera = camera([0.02, 0.5, -0.9], 30.0);
         scene.camera.center = Some(volume.grid().world_position(UVec3::new(xs.start + 14, ys.start + 7, 1)));
-        scene.transfer.iso_ranges = Some(vec![range]);
+        scene.channels[0].transfer.iso_ranges = Some(vec![range]);
         check(&format!("layers, from {xs:?} {ys:?}"), &volume, &scene);
     }
 }
@@ -375,8 +372,8 @@ fn values_in_several_layers() {
 #[test]
 fn gradient_opacity_and_iso_ranges() {
     let mut scene = oblique();
-    scene.transfer.gradient_opacity = Some(Ramp::new(vec![(5.0, 0.0), (30.0, 0.25), (90.0, 1.0)]).unwrap());
-    scene.transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 240.0]]);
+    scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(5.0, 0.0), (30.0, 0.25), (90.0, 1.0)]).unwrap());
+    scene.channels[0].transfer.iso_ranges = Some(vec![[30.0, 90.0], [120.0, 240.0]]);
     check("gradient opacity", &noise(DIMS, DVec3::new(1.0, 2.0, 1.5)), &scene);
 }
 
@@ -395,7 +392,8 @@ fn gradients_beside_holes() {
         let values = (0..).zip(whole.values()).map(sample).collect();
         let volume = Volume::new(name, DIMS, whole.spacing(), values).unwrap();
         let mut scene = oblique();
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.2), (30.0, 0.25), (90.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity =
+            Some(Ramp::new(vec![(0.0, 0.2), (30.0, 0.25), (90.0, 1.0)]).unwrap());
         for compositing in [Compositing::Linear, Compositing::Exponential] {
             scene.splatting.compositing = compositing;
             check(name, &volume, &scene);
@@ -412,7 +410,7 @@ fn no_gradient_is_ambient_light_only() {
     let volume = Volume::new("constant", DIMS, DVec3::ONE, values).unwrap();
     check("constant", &volume, &oblique());
     let mut scene = oblique();
-    scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.5), (30.0, 1.0)]).unwrap());
+    scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.5), (30.0, 1.0)]).unwrap());
     check("constant, gradient opacity", &volume, &scene);
 }
 
@@ -426,14 +424,14 @@ fn many_control_points_and_values_exactly_on_them() {
     let color: Vec<_> = points.iter().map(|&at| (at, rgb(&mut random))).collect();
     let opacity: Vec<_> = points.iter().rev().step_by(3).rev().map(|&at| (at, random.uniform(0.1, 1.0))).collect();
     let transfer = transfer(&color, &opacity);
-    let mut scene = Scene { transfer, ..oblique() };
+    let mut scene = oblique().with_transfer(transfer);
     scene.splatting.compositing = Compositing::Exponential;
     check("many control points", &noise(DIMS, DVec3::ONE), &scene);
 
     let on_points = (0..DIMS.element_product() as usize).map(|i| points[i * 7 % points.len()] as f32).collect();
     let volume = Volume::new("on points", DIMS, DVec3::ONE, on_points).unwrap();
     check("values at control points", &volume, &scene);
-    scene.transfer = crate::common::transfer(&[(3.0, [0.2, 0.4, 0.8])], &[(100.25, 0.75)]);
+    scene.channels[0].transfer = crate::common::transfer(&[(3.0, [0.2, 0.4, 0.8])], &[(100.25, 0.75)]);
     check("one control point", &volume, &scene);
 }
 
@@ -459,14 +457,14 @@ fn labels_have_their_own_tables() {
         let volume = labelled(&[first, second, third, rest]);
         let mut scene = oblique();
         scene.splatting.compositing = Compositing::Exponential;
-        scene.transfer.labels = [(first, own.clone()), (second, hidden.clone()), (third, colored.clone())]
+        scene.channels[0].transfer.labels = [(first, own.clone()), (second, hidden.clone()), (third, colored.clone())]
             .map(|(label, tables)| (u64::from(label), tables))
             .into();
         check(&format!("labels up to {third}"), &volume, &scene);
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(20.0, 0.1), (70.0, 0.8)]).unwrap());
-        scene.transfer.iso_ranges = Some(vec![[20.0, 150.0], [180.0, 250.0]]);
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(20.0, 0.1), (70.0, 0.8)]).unwrap());
+        scene.channels[0].transfer.iso_ranges = Some(vec![[20.0, 150.0], [180.0, 250.0]]);
         check(&format!("labels up to {third}, iso-ranges"), &volume, &scene);
-        scene.transfer.labels = [(u64::from(second), hidden.clone())].into();
+        scene.channels[0].transfer.labels = [(u64::from(second), hidden.clone())].into();
         check(&format!("label {second} hidden"), &volume, &scene);
     }
 }

@@ -35,11 +35,11 @@ const READ: &str = concat!(
 /// A frame with the format of values for the shader.
 fn frame(values: ValueFormat) -> Frame {
     let mut scene = scene(8, 8);
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1.0)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1.0)]);
     let volume = Volume::new("one", UVec3::ONE, DVec3::ONE, vec![0.0]).unwrap();
     let view = ViewGeometry::new(volume.grid(), &scene.camera, &scene.splatting, [8; 2]).unwrap();
     let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
-    let ramps = Ramps::new(&scene.transfer.resolve(&volume));
+    let ramps = Ramps::new(&scene.channels[0].transfer.resolve(&volume));
     uniforms::frame(&view, &kernel, (volume.grid(), values), &ramps, &scene)
 }
 

@@ -184,7 +184,7 @@ fn several_views_in_one_encoder_and_one_pass() {
     let host = Host::new();
     let renderer = host.renderer(RendererOptions::for_target(F32));
     let mut other = scene(TRANSPARENT);
-    other.volume = sheetsplat::scene::VolumeSource::Builtin("tomato:32".to_owned());
+    other.channels[0].volume = sheetsplat::scene::VolumeSource::Builtin("tomato:32".to_owned());
     (other.image.width, other.image.height) = (61, 83);
     let scenes = [scene(TRANSPARENT), other];
     let mut views = scenes.each_ref().map(|scene| host.view(scene));

@@ -75,7 +75,7 @@ fn streamed_labels_are_turned_with_their_volume() {
     let plain = StreamedLevel::new("plain", open_store(&plain, &ReadOptions::default()).unwrap(), 0);
     for labels in [open("labels-ras.nii"), open("labels-las.nii"), plain] {
         let channel = StreamedChannel::from(open("las.nii")).with_labels(labels).unwrap();
-        let volume = StreamedVolume::of_channels(channel, Vec::new(), 1 << 30).unwrap();
+        let volume = StreamedVolume::of_channels(channel, 1 << 30).unwrap();
         assert!(volume.sample.labels().unwrap() == &*expected);
     }
     // An error tells the file's own voxel.
@@ -83,7 +83,7 @@ fn streamed_labels_are_turned_with_their_volume() {
     let damaged = folder.write("damaged.nrrd", &[&damaged]);
     let labels = StreamedLevel::new("damaged", open_store(&damaged, &ReadOptions::default()).unwrap(), 0);
     let channel = StreamedChannel::from(open("las.nii")).with_labels(labels).unwrap();
-    let error = StreamedVolume::of_channels(channel, Vec::new(), 1 << 30).unwrap_err().to_string();
+    let error = StreamedVolume::of_channels(channel, 1 << 30).unwrap_err().to_string();
     assert!(error.contains("-1 at voxel [0, 0, 0]"), "{error}");
 }
 

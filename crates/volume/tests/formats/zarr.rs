@@ -174,8 +174,8 @@ fn images_of_ome_zarr() {
         assert_eq!((display.colors.as_slice(), display.window), (&[DVec3::Y][..], Some([1000.0, 1234.0])));
         let one = Volume::open_with(&path, &ReadOptions::default().with_channel(1).with_time(1)).unwrap();
         assert_eq!(
-            (one.value(UVec3::new(4, 3, 2)), one.channel_name(), one.further().len()),
-            (11234.0, Some("membrane"), 0)
+            (one.value(UVec3::new(4, 3, 2)), one.channel_name(), one.channel_count()),
+            (11234.0, Some("membrane"), 1)
         );
         let refused = Volume::open_with(&path, &ReadOptions::default().with_channel(2));
         assert_error(refused, "channel", &["found 2", "0 to 1"]);

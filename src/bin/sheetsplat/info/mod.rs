@@ -156,7 +156,7 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let text = if arguments.json {
         serde_json::to_string(&info).map_err(|error| Failure::Other(error.to_string()))? + "\n"
     } else {
-        plain_whole(&described(&info, volume, scene.index.unwrap_or(0))).to_string()
+        plain_whole(&described(&info, volume, scene.channels.first().index.unwrap_or(0))).to_string()
     };
     stdout(text.as_bytes())
 }
@@ -165,8 +165,8 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
 fn levels(volume: &OpenVolume) -> Vec<[u32; 3]> {
     match volume {
         OpenVolume::Whole(volume) => volume.levels().iter().map(|dims| dims.to_array()).collect(),
-        OpenVolume::Streamed(StreamedVolume { first, .. }) => {
-            first.values.store.levels().iter().map(|level| level.grid.dims.to_array()).collect()
+        OpenVolume::Streamed(StreamedVolume { channels, .. }) => {
+            channels.first().values.store.levels().iter().map(|level| level.grid.dims.to_array()).collect()
         }
     }
 }
@@ -176,8 +176,7 @@ fn at_finest_level(scene: &Scene) -> Scene {
     let finest =
         |volume: &VolumeSource, level: Option<u32>| level.or(matches!(volume, VolumeSource::File(_)).then_some(0));
     let mut scene = scene.clone();
-    scene.level = finest(&scene.volume, scene.level);
-    for channel in &mut scene.further {
+    for channel in scene.channels.iter_mut() {
         channel.level = finest(&channel.volume, channel.level);
     }
     scene
@@ -285,7 +284,7 @@ fn labels(volume: &Volume) -> Option<&'static str> {
 fn assumed(volume: &Volume, scene: &Scene) -> Vec<String> {
     let mut assumed = volume.assumptions();
     // The spacing of streamed volumes lies in their grids.
-    assumed.retain(|fact| scene.spacing.is_none() || !fact.starts_with("spacing"));
+    assumed.retain(|fact| scene.channels.first().spacing.is_none() || !fact.starts_with("spacing"));
     if categories::is_label_map(volume) && !volume.is_known_label_map() {
         assumed.push("labels: the values look like labels".to_owned());
     }

@@ -247,7 +247,8 @@ impl<'a> Shown<'a> {
             let check = |frame: &u32| light.check(&turned(*frame));
             frames.iter().try_for_each(check).map_err(|error| input.failure(RenderError::from(error)))?;
         }
-        let mut current = Current { time: scene.time, hash: self.hash(&volume, *depth)?, ..Current::default() };
+        let mut current =
+            Current { time: scene.channels.first().time, hash: self.hash(&volume, *depth)?, ..Current::default() };
         current.volume = Some(progress.watch(volume));
         let mut headless = None;
         for &frame in frames {
@@ -308,10 +309,10 @@ impl Current {
 
 /// The scene at another time, in all channels of the first one's file.
 fn at_time(scene: &Scene, time: u32) -> Scene {
-    let mut scene = scene.clone();
-    scene.time = Some(time);
-    for channel in scene.further.iter_mut().filter(|channel| channel.volume == scene.volume) {
-        channel.time = Some(time);
-    }
-    scene
+    let first = &scene.channels.first().volume;
+    let channels = scene.channels.clone().map(|mut channel| {
+        channel.time = if channel.volume == *first { Some(time) } else { channel.time };
+        channel
+    });
+    Scene { channels, ..scene.clone() }
 }

@@ -3,7 +3,6 @@
 mod axis;
 mod sheet;
 
-use std::borrow::Cow;
 use std::path::PathBuf;
 
 use sheetsplat::image::Image;
@@ -131,11 +130,11 @@ fn check_volumes(input: &Input, scenes: &[(Scene, Vec<String>)], outputs: &Outpu
 
 fn has_same_volume(a: &Scene, b: &Scene) -> bool {
     let facts = |scene: &Scene| -> Vec<_> {
-        let of = |channel: Cow<'_, Channel>| {
-            let Channel { volume, spacing, labels, index, time, level, .. } = channel.into_owned();
+        let of = |channel: &Channel| {
+            let Channel { volume, spacing, labels, index, time, level, .. } = channel.clone();
             (volume, spacing, labels, index, time, level)
         };
-        scene.channels().map(of).collect()
+        scene.channels.iter().map(of).collect()
     };
     facts(a) == facts(b)
 }

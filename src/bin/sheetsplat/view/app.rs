@@ -14,7 +14,7 @@ use glam::DVec2;
 use sheetsplat::image::PngDepth;
 use sheetsplat::scene::{ImageSettings, Scene};
 use sheetsplat::settings::{Camera, Sphere, TransferFunction, navigation};
-use sheetsplat::volume::Volume;
+use sheetsplat::volume::{self, Volume};
 
 use super::arguments::{Arguments, Outcome};
 use super::channels::{Change, Channels};
@@ -40,7 +40,7 @@ const CAPTURE_PATIENCE: Duration = Duration::from_secs(20);
 pub(super) struct App {
     input: String,
     scene: Scene,
-    transfer: TransferFunction,
+    transfer: volume::Channels<TransferFunction>,
     channels: Channels,
     /// The scene's original camera.
     home: Camera,
@@ -92,7 +92,7 @@ impl App {
             false => guest.transfer().clone(),
         };
         let values = guest.volume().values();
-        let editor = Editor::new(&transfer, extent(values));
+        let editor = Editor::new(transfer.first(), extent(values));
         Ok(Self {
             input: arguments.input.name.clone(),
             home: scene.camera,

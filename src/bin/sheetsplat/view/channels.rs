@@ -5,7 +5,7 @@ use glam::DVec3;
 use sheetsplat::appearance::categories;
 use sheetsplat::scene::Scene;
 use sheetsplat::settings::{Ramp, TransferFunction};
-use sheetsplat::volume::Volume;
+use sheetsplat::volume::{self, Volume};
 
 /// A volume's channels as the panel shows them.
 pub(super) struct Channels {
@@ -34,8 +34,8 @@ impl Channels {
     /// The channels of a volume as a scene shows them.
     pub(super) fn new(scene: &Scene, volume: &Volume) -> Self {
         // Without settings of its own a channel has the scene's.
-        let of = |number: usize| if scene.further.is_empty() { 0 } else { number };
-        let is_shown = |number| scene.channels().nth(of(number)).is_none_or(|channel| channel.visible);
+        let of = |number: usize| if scene.channels.len() == 1 { 0 } else { number };
+        let is_shown = |number| scene.channels.get(of(number)).is_none_or(|channel| channel.visible);
         let row = |(number, channel): (usize, &Volume)| Row {
             name: scene.channel_name(volume, number),
             is_shown: is_shown(number),
@@ -45,10 +45,9 @@ impl Channels {
     }
 
     /// The transfer functions of all channels, hidden ones too.
-    pub(super) fn transfer(scene: &Scene, volume: &Volume) -> TransferFunction {
+    pub(super) fn transfer(scene: &Scene, volume: &Volume) -> volume::Channels<TransferFunction> {
         let mut all = scene.clone();
-        all.visible = true;
-        all.further.iter_mut().for_each(|channel| channel.visible = true);
+        all.channels.iter_mut().for_each(|channel| channel.visible = true);
         all.resolve(volume)
     }
 
@@ -68,16 +67,15 @@ impl Channels {
     }
 
     /// The transfer function of that channel.
-    pub(super) fn edited_of<'a>(&self, transfer: &'a mut TransferFunction) -> &'a mut TransferFunction {
-        of_channel(transfer, self.edited)
+    pub(super) fn edited_of<'a>(&self, transfer: &'a mut [TransferFunction]) -> &'a mut TransferFunction {
+        &mut transfer[self.edited]
     }
 
     /// The list.
-    pub(super) fn show(&mut self, ui: &mut Ui, transfer: &mut TransferFunction) -> Option<Change> {
+    pub(super) fn show(&mut self, ui: &mut Ui, transfer: &mut [TransferFunction]) -> Option<Change> {
         let Self { rows, edited } = self;
         let mut change = None;
-        for (number, row) in rows.iter_mut().enumerate() {
-            let of = of_channel(transfer, number);
+        for ((number, row), of) in rows.iter_mut().enumerate().zip(transfer) {
             let color = of.color.points().last().map(|(_, color)| *color).unwrap_or_default();
             let mut srgb = (color * 255.0).to_array().map(|channel| channel.round() as u8);
             let [red, green, blue] = srgb;
@@ -98,11 +96,10 @@ impl Channels {
     }
 
     /// Transfer functions without those of hidden channels.
-    pub(super) fn shown(&self, transfer: &TransferFunction) -> TransferFunction {
+    pub(super) fn shown(&self, transfer: &volume::Channels<TransferFunction>) -> volume::Channels<TransferFunction> {
         let mut shown = transfer.clone();
         let Ok(nothing) = Ramp::new(vec![(0.0, 0.0)]) else { return shown };
-        for (number, _) in self.rows.iter().enumerate().filter(|(_, row)| !row.is_shown) {
-            let of = of_channel(&mut shown, number);
+        for (_, of) in self.rows.iter().zip(&mut shown).filter(|(row, _)| !row.is_shown) {
             of.opacity = nothing.clone();
             of.labels.clear();
         }
@@ -110,20 +107,10 @@ impl Channels {
     }
 
     /// Notes in a scene that states every channel which are shown, and their transfer functions.
-    pub(super) fn note(&self, scene: &mut Scene, transfer: &TransferFunction) {
-        let (first, further) = self.rows.split_at(self.rows.len().min(1));
-        first.iter().for_each(|row| scene.visible = row.is_shown);
-        for ((channel, row), of) in scene.further.iter_mut().zip(further).zip(&transfer.further) {
+    pub(super) fn note(&self, scene: &mut Scene, transfer: &[TransferFunction]) {
+        for ((channel, row), of) in scene.channels.iter_mut().zip(&self.rows).zip(transfer) {
             (channel.visible, channel.transfer) = (row.is_shown, of.clone().into());
         }
-    }
-}
-
-/// The transfer function of a channel.
-fn of_channel(transfer: &mut TransferFunction, number: usize) -> &mut TransferFunction {
-    match number {
-        0 => transfer,
-        _ => &mut transfer.further[number - 1],
     }
 }
 
@@ -161,12 +148,12 @@ mod tests {
         channels.rows[2].is_shown = false;
         let all = Channels::transfer(&scene, &volume);
         let shown = channels.shown(&all);
-        let opacities = |of: &TransferFunction| of.channels().map(|of| of.alpha(1e6, 0.0) > 0.0).collect::<Vec<_>>();
+        let opacities = |of: &[TransferFunction]| of.iter().map(|of| of.alpha(1e6, 0.0) > 0.0).collect::<Vec<_>>();
         assert_eq!((opacities(&all), opacities(&shown)), (vec![true; 3], vec![false, true, false]));
         let mut noted = scene.explicit(&volume);
         channels.note(&mut noted, &all);
-        assert_eq!((noted.visible, noted.further[0].visible, noted.further[1].visible), (false, true, false));
-        assert_eq!(noted.further[1].transfer.opacity.as_ref(), Some(&all.further[1].opacity));
+        assert_eq!(noted.channels[2].transfer.opacity.as_ref(), Some(&all[2].opacity));
+        assert_eq!(noted.channels.map(|channel| channel.visible)[..], [false, true, false]);
     }
 
     #[test]
@@ -200,7 +187,7 @@ mod tests {
         assert_eq!(channels.edited_name(), "channel 2");
         assert!(transfer == before, "nothing else changes");
         channels.edited_of(&mut transfer).iso_ranges = Some(vec![[1.0, 2.0]]);
-        assert!(transfer.further[1].iso_ranges.is_some() && transfer.further[0] == before.further[0]);
+        assert!(transfer[2].iso_ranges.is_some() && transfer[..2] == before[..2]);
     }
 
     #[test]
@@ -208,9 +195,9 @@ mod tests {
         let (scene, volume) = three();
         let mut transfer = Channels::transfer(&scene, &volume);
         let before = transfer.clone();
-        recolor(of_channel(&mut transfer, 1), DVec3::X);
-        assert!([-5.0, 0.0, 300.0].iter().all(|&value| transfer.further[0].color.at(value) == DVec3::X));
-        assert_eq!(transfer.further[0].opacity, before.further[0].opacity);
-        assert!(transfer.color == before.color && transfer.further[1] == before.further[1]);
+        recolor(&mut transfer[1], DVec3::X);
+        assert!([-5.0, 0.0, 300.0].iter().all(|&value| transfer[1].color.at(value) == DVec3::X));
+        assert_eq!(transfer[1].opacity, before[1].opacity);
+        assert!(transfer[0].color == before[0].color && transfer[2] == before[2]);
     }
 }

@@ -131,8 +131,8 @@ mod tests {
             opacity: Ramp::new(vec![(10.0, 0.0), (20.0, 0.5), (40.0, 1.0)]).unwrap(),
             gradient_opacity: Some(Ramp::new(vec![(3.0, 0.5)]).unwrap()),
             iso_ranges: Some(vec![[5.0, 60.0]]),
+            membership: false,
             labels: BTreeMap::new(),
-            further: Vec::new(),
         }
     }
 

@@ -10,7 +10,7 @@ use sheetsplat::headless::{Backend, device};
 use sheetsplat::scoped;
 use sheetsplat::settings::{Classification, TransferFunction};
 use sheetsplat::stats::Stats;
-use sheetsplat::volume::{Grid, Volume};
+use sheetsplat::volume::{Channels, Grid, Volume};
 use sheetsplat::{Blend, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, wgpu};
 
 use crate::failure::Failure;
@@ -80,8 +80,8 @@ impl Guest {
         self.view.volume().grid()
     }
 
-    /// The transfer function.
-    pub(super) fn transfer(&self) -> &TransferFunction {
+    /// The transfer functions of the channels.
+    pub(super) fn transfer(&self) -> &Channels<TransferFunction> {
         self.view.volume().transfer()
     }
 
@@ -101,7 +101,7 @@ impl Guest {
     }
 
     /// Draws a frame and waits for it, if it differs from the last requested one. Returns whether it did.
-    pub(super) fn show(&mut self, scene: &Scene, transfer: &TransferFunction) -> Result<bool, RenderError> {
+    pub(super) fn show(&mut self, scene: &Scene, transfer: &Channels<TransferFunction>) -> Result<bool, RenderError> {
         let is_shown = self.stats.width > 0 && scene == self.view.scene() && transfer == self.transfer();
         if is_shown {
             return Ok(false);
@@ -111,7 +111,7 @@ impl Guest {
         scoped(&device, || self.draw(scene, transfer))?.map(|()| true)
     }
 
-    fn draw(&mut self, scene: &Scene, transfer: &TransferFunction) -> Result<(), RenderError> {
+    fn draw(&mut self, scene: &Scene, transfer: &Channels<TransferFunction>) -> Result<(), RenderError> {
         let start = Instant::now();
         let Self { view, renderer, .. } = self;
         let RenderState { device, queue, .. } = &self.host;

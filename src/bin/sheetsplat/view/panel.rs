@@ -18,15 +18,7 @@ pub(super) fn splatting(ui: &mut Ui, splatting: &mut Splatting) {
         ui,
         "compositing",
         &mut splatting.compositing,
-        &[
-            (Compositing::Linear, "linear"),
-            (Compositing::Exponential, "exponential"),
-            (Compositing::Xray, "xray"),
-            (Compositing::Maximum, "maximum"),
-            (Compositing::Minimum, "minimum"),
-            (Compositing::Average, "average"),
-            (Compositing::Surface, "surface"),
-        ],
+        &Compositing::ALL.map(|(name, compositing)| (compositing, name)),
     );
     choice(
         ui,

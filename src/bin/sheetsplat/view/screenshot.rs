@@ -20,11 +20,13 @@ pub(super) fn free_name(extension: &str) -> PathBuf {
 /// Saves a scene as shown, with the current transfer function.
 pub(super) fn save_scene(
     scene: &Scene,
-    transfer: &TransferFunction,
+    transfer: &[TransferFunction],
     volume: &Volume,
     path: &Path,
 ) -> Result<(), Failure> {
-    let scene = Scene { transfer: TransferSettings::stating(transfer.clone(), volume), ..scene.clone() };
+    let mut scene = scene.clone();
+    let channels = scene.channels.iter_mut().zip(transfer).zip(volume.channels());
+    channels.for_each(|((of, transfer), channel)| of.transfer = TransferSettings::stating(transfer.clone(), channel));
     let text = scene_file(&scene.explicit(volume), path)?;
     output::write(path, &text).map_err(|error| Failure::Other(format!("{}: {error}", path.display())))
 }
@@ -60,10 +62,11 @@ mod tests {
         let sets = ["image.width=70", "preset=ct-bone", "splatting.classification=after"].map(str::to_owned);
         let scene = Scene::from_volume(VolumeSource::Builtin("head:16".to_owned()), &sets).unwrap();
         let volume = scene.load_volume().unwrap();
-        let edited = TransferFunction { iso_ranges: Some(vec![[3.0, 90.0]]), ..scene.resolve(&volume) };
+        let mut edited = scene.resolve(&volume);
+        edited.first_mut().iso_ranges = Some(vec![[3.0, 90.0]]);
         save_scene(&scene, &edited, &volume, &path).unwrap();
         let saved = Scene::open(&path, &[]).unwrap();
-        assert_eq!(saved.transfer.resolve(&volume), edited);
+        assert_eq!(saved.resolve(&volume), edited);
         assert_eq!((saved.image, saved.shading, saved.splatting), (scene.image, scene.shading, scene.splatting));
     }
 

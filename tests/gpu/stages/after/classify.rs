@@ -249,10 +249,10 @@ fn labels_and_gradient_opacity_are_the_twins() {
     let (dims, origin) = (head.dims(), "labels".to_owned());
     let volume = head.with_labels(Labels { origin, dims, spacing: None, values, names: BTreeMap::new() }).unwrap();
     let mut scene = head_scene(None);
-    scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (40.0, 1.0)]).unwrap());
+    scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (40.0, 1.0)]).unwrap());
     let tables =
         LabelTables { opacity: Some(Ramp::new(vec![(60.0, 0.0), (90.0, 0.9)]).unwrap()), ..LabelTables::default() };
-    scene.transfer.labels.insert(1, tables);
+    scene.channels[0].transfer.labels.insert(1, tables);
     for compositing in [Compositing::Linear, Compositing::Surface] {
         scene.splatting.compositing = compositing;
         with_case(gpu, ("labels", &volume, &scene), check);

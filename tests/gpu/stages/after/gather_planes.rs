@@ -196,7 +196,7 @@ fn chosen_numbers_and_surfaces_are_the_twins() {
         scene.splatting.culling = false;
         let head = uneven(&head([1.0, 1.3, 2.0], projection.is_none()));
         with_case(gpu, ("head", &head, &scene), |prepared, twin| check(prepared, twin, &stage, None));
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.6), (40.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.6), (40.0, 1.0)]).unwrap());
         cut(&mut scene);
         let first_hit = (compositing != Compositing::Minimum).then_some(0.15);
         let host = Host { first_hit, ..Host::default() };
@@ -217,10 +217,10 @@ fn cut_pixels_first_hits_and_labels_are_the_twins() {
     {
         let mut scene = head_scene(projection);
         (scene.splatting.compositing, scene.splatting.culling) = (compositing, false);
-        scene.transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (40.0, 1.0)]).unwrap());
+        scene.channels[0].transfer.gradient_opacity = Some(Ramp::new(vec![(0.0, 0.1), (40.0, 1.0)]).unwrap());
         let own =
             LabelTables { opacity: Some(Ramp::new(vec![(60.0, 0.0), (90.0, 0.9)]).unwrap()), ..LabelTables::default() };
-        scene.transfer.labels.insert(1, own);
+        scene.channels[0].transfer.labels.insert(1, own);
         with_case(gpu, ("labels", &labelled, &scene), |prepared, twin| check(prepared, twin, &stage, None));
         let mut scene = head_scene(projection);
         (scene.splatting.compositing, scene.splatting.culling) = (compositing, false);

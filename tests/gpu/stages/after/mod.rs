@@ -42,7 +42,7 @@ fn head(spacing: [f64; 3], has_holes: bool) -> Volume {
 fn head_scene(projection: Option<Projection>) -> Scene {
     let mut scene = scene(45, 40);
     scene.splatting.classification = Classification::After;
-    scene.transfer = transfer(
+    scene.channels[0].transfer = transfer(
         &[(40.0, [0.9, 0.6, 0.4]), (255.0, [1.0, 1.0, 0.9])],
         &[(30.0, 0.0), (70.0, 0.3), (71.0, 0.02), (150.0, 0.0), (200.0, 0.8)],
     );
@@ -107,7 +107,12 @@ impl<'a> Prepared<'a> {
         let coefficients: Vec<f32> = twin.field().coefficients().iter().map(|&c| c as f32).collect();
         let numbers = Normalization::of(coefficients.iter().copied()).unwrap();
         let integration = Integration { splatting, numbers: std::slice::from_ref(&numbers) };
-        let ramps = Ramps::of_channels(transfer, &[Stored { labels: 1, colors: 0 }], 0, Some(integration));
+        let ramps = Ramps::of_channels(
+            std::slice::from_ref(transfer),
+            &[Stored { labels: 1, colors: 0 }],
+            0,
+            Some(integration),
+        );
         let kernel = Kernel::new(splatting.radius, splatting.falloff);
         let values = VolumeTexture::upload(device, queue, volume.values()).unwrap();
         let frame = uniforms::frame(&view, &kernel, (grid, values.format), &ramps, scene);
@@ -182,8 +187,8 @@ fn with_host(
     (name, volume, scene): (&str, &Volume, &Scene),
     check: impl Fn(&Prepared<'_>, &Frame<'_>),
 ) {
-    let transfer = scene.transfer.resolve(volume);
-    let twin = Frame::new(host, volume, &transfer, scene).unwrap();
+    let transfer = scene.channels[0].transfer.resolve(volume);
+    let twin = Frame::new(host, volume, std::slice::from_ref(&transfer), scene).unwrap();
     check(&Prepared::new(gpu, (name, volume, scene), &transfer, &twin), &twin);
 }
 
@@ -243,7 +248,7 @@ fn shown_by(compositing: Compositing, projection: Option<Projection>) -> Scene {
         _ => None,
     };
     if let Some(points) = opacity {
-        scene.transfer.opacity = Some(Ramp::new(points.to_vec()).unwrap());
+        scene.channels[0].transfer.opacity = Some(Ramp::new(points.to_vec()).unwrap());
     }
     scene
 }

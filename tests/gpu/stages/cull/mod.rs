@@ -222,7 +222,6 @@ impl Case {
             iso_ranges: None,
             membership: false,
             labels: BTreeMap::new(),
-            further: Vec::new(),
         }
     }
 

@@ -92,7 +92,7 @@ fn frames() {
             let points = random.pick(&[1, 4, 8, 9, 40]);
             let opacity = if compositing == Compositing::Xray { 0.01 } else { 0.6 };
             let (mut volume, transfer) = noise(&mut random, dims, frame.1, opacity, points);
-            scene.transfer = transfer;
+            scene.channels[0].transfer = transfer;
             if random.bits().is_multiple_of(3) {
                 let sample = |value: f32| if random.bits().is_multiple_of(4) { f32::NAN } else { value };
                 let values = volume.values().iter().map(sample).collect();
@@ -127,7 +127,7 @@ fn dispatches_and_bands_change_no_more_than_rounding() {
         let (volume, transfer) = noise(&mut random, UVec3::new(17, 30, 21), [1.0, 1.0, 2.0], 0.9, 4);
         // The voxels are opaque enough for surfaces.
         let transfer = TransferSettings { gradient_opacity: None, ..transfer };
-        let mut scene = Scene { transfer, camera: camera([0.3, 0.9, -0.2], 40.0), ..scene(101, 77) };
+        let mut scene = Scene { camera: camera([0.3, 0.9, -0.2], 40.0), ..scene(101, 77) }.with_transfer(transfer);
         (scene.splatting.order, scene.splatting.opacity_threshold) = (order, 0.8);
         scene.splatting.compositing = compositing;
         let fixture = Fixture::new(gpu, &stage, scene, volume);
@@ -170,7 +170,7 @@ fn the_minimum_extends_behind_all_bricks() {
     let volume = Volume::new("front", dims, DVec3::ONE, (0..dims.element_product()).map(value).collect()).unwrap();
     // One pixel in the middle sees all voxels, so that a group needs about the maximum number of passes.
     let mut scene = Scene { camera: camera([0.0, 1.0, 0.0], 200.0), ..scene(17, 17) };
-    scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.5)]);
+    scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 0.0), (1.0, 0.5)]);
     scene.splatting.compositing = Compositing::Minimum;
     let fixture = Fixture::new(gpu, &stage, scene, volume);
     let bins = fixture.bins();
@@ -194,7 +194,7 @@ fn more_voxels_than_the_queue_holds() {
     let mut random = Random(45);
     for (slab_width, order) in [(1.0, Order::FrontToBack), (0.3, Order::BackToFront), (2.6, Order::FrontToBack)] {
         let (volume, transfer) = noise(&mut random, UVec3::splat(24), [1.0; 3], 0.05, 4);
-        let mut scene = Scene { transfer, camera: camera([0.3, 0.9, -0.2], 26.0), ..scene(33, 17) };
+        let mut scene = Scene { camera: camera([0.3, 0.9, -0.2], 26.0), ..scene(33, 17) }.with_transfer(transfer);
         (scene.splatting.slab_width, scene.splatting.order, scene.splatting.culling) = (slab_width, order, false);
         let fixture = Fixture::new(gpu, &stage, scene, volume);
         let bins = fixture.bins();
@@ -221,7 +221,7 @@ fn hidden_behind_what_is_there() {
             scene.splatting.footprint_box = footprint_box;
             scene.splatting.radius = random.uniform(1.0, 3.0);
             // The voxels are so faint that nothing becomes opaque.
-            scene.transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1e-6)]);
+            scene.channels[0].transfer = transfer(&[(0.0, [1.0; 3])], &[(0.0, 1e-6)]);
             let values = vec![1.0; 8 * 9 * 7];
             let volume = Volume::new("dense", UVec3::new(8, 9, 7), DVec3::from(frame.1), values).unwrap();
             let fixture = Fixture::new(gpu, &stage, scene, volume);

@@ -48,8 +48,8 @@ struct Drawn {
 
 impl<'a> Fixture<'a> {
     fn new(gpu: &'a GpuHeadless, stage: &'a Gather, scene: Scene, volume: Volume) -> Self {
-        let transfer = scene.transfer.resolve(&volume);
-        let voxels = classify(&volume, &transfer, &ClippedVoxels::default());
+        let transfer = scene.channels[0].transfer.resolve(&volume);
+        let voxels = classify(&volume, std::slice::from_ref(&transfer), &ClippedVoxels::default());
         let bricks = BrickList::new(volume.grid(), &voxels);
         Self { gpu, stage, seen: Seen::new(volume.grid(), scene), volume, transfer, bricks }
     }
@@ -170,7 +170,7 @@ impl<'a> Fixture<'a> {
     fn twin(&self) -> Vec<DVec4> {
         let mut scene = self.seen.scene.clone();
         scene.image.background = [0.0; 4];
-        let image = reference::render(&self.volume, &self.transfer, &scene).unwrap();
+        let image = reference::render(&self.volume, std::slice::from_ref(&self.transfer), &scene).unwrap();
         image.pixels.iter().map(|pixel| DVec4::from_array(pixel.map(f64::from))).collect()
     }
 }
@@ -202,7 +202,7 @@ fn sections() {
         for width in [0.25, 1.0, 3.7] {
             let (volume, transfer) = one_voxel(view.1);
             let mut scene = view_scene(view, kernel, width, FootprintForm::SummedArea);
-            (scene.transfer, scene.shading.enabled) = (transfer, false);
+            (scene.channels[0].transfer, scene.shading.enabled) = (transfer, false);
             scene.splatting.compositing = Compositing::Xray;
             let at = DVec2::new(random.uniform(-2.0, 72.0), random.uniform(-2.0, 47.0));
             look_at(&mut scene, volume.grid(), UVec3::ZERO, at);

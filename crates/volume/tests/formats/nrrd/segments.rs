@@ -53,6 +53,6 @@ fn segments_without_a_layer_of_the_file() {
     let none = LAYERS.replace("Segment1_Layer:=1\n", "").replace("Segment2_Layer:=1", "Segment2_Layer:=x");
     let volume = folder.open("a.nrrd", &[none.as_bytes(), &[1, 1, 0, 2]].concat()).unwrap();
     assert_eq!(volume.label_names().len(), 1);
-    let second = &volume.further()[0];
+    let second = volume.channel(1).unwrap();
     assert_eq!((second.label_names(), second.palette()), (&BTreeMap::new(), None));
 }
