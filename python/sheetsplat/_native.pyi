@@ -18,6 +18,7 @@ __all__ = [
     "check_golden",
     "check_outputs",
     "check_sizes",
+    "color_array",
     "color_volume",
     "colormap",
     "colormaps",
@@ -40,6 +41,7 @@ __all__ = [
     "tidy",
     "value_range",
     "with_camera",
+    "with_colors",
     "write",
 ]
 
@@ -103,6 +105,8 @@ class Volume:
     def level(self) -> int: ...
     @property
     def channels(self) -> int: ...
+    @property
+    def labelled(self) -> bool: ...
     def values(self, channel: int) -> NDArray[np.float32]: ...
     def info(self) -> dict[str, Any]: ...
 
@@ -221,3 +225,5 @@ def color_volume(
     placement: tuple[list[list[float]], tuple[float, float, float]] | None,
     unit: str | None,
 ) -> Volume: ...
+def color_array(volume: Volume) -> NDArray[np.uint16] | None: ...
+def with_colors(volume: Volume, colors: NDArray[np.uint16]) -> Volume: ...

@@ -14,7 +14,7 @@ from ._checks import finite, names, refused
 from ._loading import loading
 from ._settings import Settings, Side, completed
 from .errors import FileError, SceneError
-from .volume import Volume, _memory
+from .volume import Origin, Volume, _memory
 
 __all__ = ["Scene"]
 
@@ -181,7 +181,10 @@ class Scene:
             The volume.
         """
         with loading(None, progress) as bytes_read:
-            return Volume._of(self._opening.load_volume(_memory(memory), bytes_read, index))
+            opened = self._opening.load_volume(_memory(memory), bytes_read, index)
+        of_index = None if index is None else os.path.abspath(os.fsdecode(index))
+        # With the paths that its relative ones are now.
+        return Volume._of(opened, Origin(_restored(*self.__reduce__()[1]), memory, of_index))
 
     def explicit(
         self, volume: Volume, *, all_around: bool = False, annotate: str | Sequence[str] = ()

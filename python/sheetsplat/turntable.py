@@ -8,6 +8,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, Unpack, overload
 
+from . import _formats as formats
 from . import _movies as movies
 from . import _native as native
 from . import _words as words
@@ -112,7 +113,7 @@ def _numbered(output: str, numbers: range) -> tuple[list[str], Callable[[Iterato
     before, number, after = numbered.groups()
     number = f"%0{len(number)}d" if number.startswith("#") else number
     pattern = os.path.join(folder.replace("%", "%%"), before + number + after)
-    native.check_format(pattern % 0)
+    formats.check(pattern % 0)
     paths = [pattern % frame for frame in numbers]
 
     def save(pictures: Iterator[Image]) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Unpack
 
 from . import _native as native
+from . import _stores as stores
 from . import _words as words
 from ._checks import finite, names, refused, whole
 from ._settings import Arguments, Backend, Settings, completed
@@ -309,11 +310,12 @@ def _opened(
     index: str | os.PathLike[str] | None = None,
 ) -> Volume:
     """The volume that a scene names, or another source's for a scene that may choose its level."""
+    place = None if isinstance(source, Scene) else stores.located(source)
+    if place is not None:
+        steps = None if spacing is None else _spacing(spacing)
+        return _open(place, memory, progress, [None, None, None], look._opening, steps, labels, index)
     if isinstance(source, Scene):
         volume = source.load_volume(memory=memory, progress=progress, index=index)
-    elif isinstance(source, (str, os.PathLike)):
-        steps = None if spacing is None else _spacing(spacing)
-        return Volume._of(_open(source, memory, progress, [None, None, None], look._opening, steps, labels, index))
     elif isinstance(source, Volume):
         volume = source
     else:

@@ -2,9 +2,11 @@
 
 use std::sync::Arc;
 
-use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use numpy::{PyArray1, PyArray3, PyArray4, PyArrayMethods, PyReadonlyArray4, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use sheetsplat::volume::Texel;
 
+use crate::error::{self, Raised};
 use crate::process::{detached, prepare_numpy};
 use crate::volume::{Volume, extent_and_mean};
 
@@ -41,6 +43,36 @@ pub(crate) fn label_array<'py>(py: Python<'py>, volume: &Volume) -> PyResult<Opt
     grid.reorder(&mut labels);
     let array: Bound<'_, PyArray3<u16>> = PyArray1::from_vec(py, labels).reshape(shape)?;
     Ok(Some(array.into_any()))
+}
+
+/// A copy of the colours, `[z, y, x, 4]`, shares of 65535, in the order of the file or the array; `None` if the volume has none.
+#[pyfunction]
+pub(crate) fn color_array<'py>(py: Python<'py>, volume: &Volume) -> PyResult<Option<Bound<'py, PyArray4<u16>>>> {
+    let whole = volume.whole("colours")?;
+    let Some(colors) = whole.colors() else { return Ok(None) };
+    prepare_numpy(py)?;
+    let mut colors = colors.to_vec();
+    whole.grid().reorder(&mut colors);
+    let [x, y, z] = whole.dims().to_array().map(|size| size as usize);
+    Ok(Some(PyArray1::from_vec(py, colors.into_flattened()).reshape([z, y, x, 4])?))
+}
+
+/// A volume of the luminances that its values are, with the colours that [`color_array`] gave.
+#[pyfunction]
+pub(crate) fn with_colors(volume: &Volume, colors: PyReadonlyArray4<'_, u16>) -> PyResult<Volume> {
+    let whole = volume.whole("colours")?;
+    let mut texels: Vec<Texel> = colors.as_slice().map_err(|_| unfit(&colors))?.as_chunks::<4>().0.to_vec();
+    if texels.len() != whole.values().len() {
+        return Err(unfit(&colors).into());
+    }
+    whole.grid().reorder(&mut texels);
+    let colored = sheetsplat::Volume::clone(whole).with_texels(texels);
+    Ok(Volume(colored.into(), volume.1.clone()))
+}
+
+/// The error for colours of another shape than a volume's.
+fn unfit(colors: &PyReadonlyArray4<'_, u16>) -> Raised {
+    error::volume("colours", &format!("{:?}", colors.shape()), "four contiguous numbers for each voxel")
 }
 
 /// How the volume lies in the patient, as its file or array states it.

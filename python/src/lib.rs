@@ -25,7 +25,7 @@ mod _native {
     #[pymodule_export]
     use crate::colors::color_volume;
     #[pymodule_export]
-    use crate::facts::{label_array, placement, value_range};
+    use crate::facts::{color_array, label_array, placement, value_range, with_colors};
     #[pymodule_export]
     use crate::golden::{Comparison, check_golden, compare, open_image};
     #[pymodule_export]

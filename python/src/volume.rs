@@ -248,6 +248,12 @@ impl Volume {
         self.0.sample().channels().count()
     }
 
+    /// Whether each voxel has a label beside its value.
+    #[getter]
+    fn labelled(&self) -> bool {
+        self.0.sample().labels().is_some()
+    }
+
     #[getter]
     fn unit(&self) -> Option<&str> {
         self.0.sample().unit()

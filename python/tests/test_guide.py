@@ -9,7 +9,7 @@ import pytest
 GUIDE = pathlib.Path(__file__).parents[2] / "docs" / "guide"
 
 
-@pytest.mark.parametrize("page", ["python-words"])
+@pytest.mark.parametrize("page", ["python-words", "python-data"])
 def test_page(page: str, tmp_path: pathlib.Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The blocks of a page run one after another, in a folder of their own, without a warning."""
     monkeypatch.chdir(tmp_path)
