@@ -34,6 +34,7 @@ img { image-rendering: pixelated; display: block; width: calc(var(--width) * var
 figure { margin: 0; }
 .scroll { overflow: auto; max-width: 90vw; max-height: 80vh; background: repeating-conic-gradient(#999 0 25%, #bbb 0 50%) 0 0 / 16px 16px; }
 .both { position: relative; width: max-content; cursor: ew-resize; touch-action: none; }
+.both .golden { clip-path: inset(0 calc(100% - var(--at, 50%)) 0 0); }
 .both .found { position: absolute; inset: 0 auto auto 0; clip-path: inset(0 0 0 var(--at, 50%)); }
 .both::after { content: ""; position: absolute; inset: 0 auto 0 var(--at, 50%); border-left: 1px solid #f0f; }
 """

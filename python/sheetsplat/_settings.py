@@ -143,6 +143,7 @@ class Settings(TypedDict, total=False):
     azimuth: float | None
     elevation: float | None
     zoom: float | None
+    only: str | int | None
 
 
 class Arguments(Settings, total=False):

@@ -47,12 +47,13 @@ _FROM_KEYS = {
     "azimuth": ("camera.direction", "camera.up"),
     "elevation": ("camera.direction", "camera.up"),
     "zoom": ("camera.height", "camera.distance", "camera.projection"),
+    "only": (),
 }
 
 _WORDS = {*_KEYS, *_FROM_KEYS}
 
 #: The words that place the camera.
-OF_CAMERA = ("view", "side", *_FROM_KEYS)
+OF_CAMERA = ("view", "side", "azimuth", "elevation", "zoom")
 
 #: The sides of a patient, which depend on the volume.
 _SIDES = ("front", "back", "left", "right", "top", "bottom")
@@ -167,6 +168,9 @@ def _checked(word: str, said: Said) -> Said:
         value = _range(name, value)
     elif word == "size":
         value = _size(name, value)
+    elif word == "only":
+        if not isinstance(value, str):
+            value = str(whole(name, value, 0, 2**64 - 1))
     elif word == "zoom":
         value = finite(name, value)
         if value <= 0:
@@ -304,6 +308,8 @@ def settled(
     scene, unknown = stated(bare, words)
     if not unknown:
         return scene
+    if "only" in words:
+        scene = _alone(scene, words["only"].value, volume)
     scene = _colored(scene, words, volume)
     if "view" in words:
         scene = _seen(scene, words["view"], volume)
@@ -316,6 +322,14 @@ def settled(
         key = "height" if camera["projection"] == "orthographic" else "distance"
         scene = _replaced(scene, words, {f"camera.{key}": camera[key] / words["zoom"].value}, "zoom")
     return scene
+
+
+def _alone(scene: native.Scene, label: str, volume: native.Volume) -> native.Scene:
+    """A scene with one label alone, and with the appearance that it leaves open stated."""
+    tables = tomllib.loads(native.only(scene, volume, label).to_toml("."))
+    # The volume goes on to choose the camera.
+    keys = {key: table for key, table in tables.items() if key not in ("camera", "image", "volume")}
+    return scene.replaced(keys)
 
 
 def _seen(scene: native.Scene, side: Said, volume: native.Volume) -> native.Scene:

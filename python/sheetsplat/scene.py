@@ -50,6 +50,9 @@ class Scene:
             ``camera.direction`` and ``camera.up``: the eye goes to the right and then up, from where it would be.
         zoom : number above 0
             ``camera.height`` (in perspective ``distance``) of the framed picture, divided by this.
+        only : str or int
+            ``transfer.label`` with ``visible = false`` for all labels but this one, given by its name or its number; of a
+            label map, ``transfer.iso_ranges``.
 
     Raises
     ------

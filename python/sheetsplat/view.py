@@ -58,7 +58,7 @@ class View:
         Light sheets that `save_light` or ``sheetsplat light`` has made of the same scene: the same pictures, sooner.
     **settings
         Settings over those of `scene`, and words for some of them, as for `Scene`: `cmap`, `clim`, `opacity`,
-        `background`, `size`, `view`, `azimuth`, `elevation`, `zoom`.
+        `background`, `size`, `view`, `azimuth`, `elevation`, `zoom`, `only`.
 
     Examples
     --------

@@ -203,6 +203,39 @@ def test_errors_that_need_the_volume() -> None:
             render(ball(), **words)  # type: ignore[arg-type]
 
 
+def test_one_label_alone() -> None:
+    """By name or number, of labels beside values and of a label map; the program's `--only` is the same."""
+    tomato = Volume("builtin:tomato:24")
+    alone = render(tomato, only="seeds", size=SMALL)
+    assert alone == render(tomato, only=5, size=SMALL) == render(tomato, only="5", size=SMALL)
+    assert alone == View(tomato, size=SMALL).render(only="seeds") != render(tomato, size=SMALL)
+    look = Scene(size=SMALL, view="xz")
+    expected = Scene._of(sheetsplat._native.only(look._native, tomato._native, "seeds"))
+    assert render(tomato, scene=look, only="seeds") == render(tomato, scene=expected)
+    near = View(tomato, only="seeds", size=SMALL, zoom=2, cmap="hot_r")
+    height = View(tomato, only="seeds", size=SMALL, cmap="hot_r").scene.explicit(tomato).to_dict()["camera"]["height"]
+    assert near.scene.to_dict()["camera"]["height"] == height / 2
+    labels = np.zeros((12, 12, 12), np.int64)
+    for number, label in enumerate((3, 100_000, 7)):
+        labels[4 * number : 4 * number + 4, 2:10, 2:10] = label
+    beside = Volume(labels % 11, labels=labels)
+    table = [{"label": label, "visible": label == 100_000} for label in (0, 3, 7, 100_000)]
+    assert render(beside, only=100_000, size=SMALL, preset="none") == render(
+        beside, transfer={"label": table}, size=SMALL, preset="none"
+    )
+    label_map = Volume(np.where(labels == 100_000, 5, labels))
+    assert keys(label_map, only=7, preset="labels")["transfer"]["iso_ranges"] == [[7, 7]]
+    for source, label, message in (
+        (tomato, "seed", 'only: found "seed", allowed: .*"seeds"'),
+        (beside, 4, 'only: found "4", allowed: 0, 3, 7, 100000'),
+        (ball(), 1, "only: found .*a label map, or a volume with labels"),
+        (tomato, -1, "only: found -1, allowed: a whole number from 0"),
+        (tomato, 1.5, "only: found 1.5"),
+    ):
+        with pytest.raises(SceneError, match=message):
+            render(source, only=label)  # type: ignore[arg-type]
+
+
 def test_misspelt_keywords_of_each_function() -> None:
     for call, meant in (
         (lambda: render(ball(), spacin=2), "spacing"),  # type: ignore[call-arg]
