@@ -2,10 +2,11 @@
 //   node build.mjs
 // Needs Rust's target wasm32-unknown-unknown and the wasm-bindgen of Cargo.lock's version, which `.ci/setup --web` installs.
 import { execFileSync } from "node:child_process";
-import { existsSync, mkdirSync, readFileSync, rmSync } from "node:fs";
+import { existsSync, mkdirSync, readFileSync, renameSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
+import { rolldown } from "rolldown";
 
 const here = dirname(fileURLToPath(import.meta.url));
 const root = dirname(here);
@@ -50,3 +51,21 @@ for (const [backend, level] of [["cpu", "s"], ["gpu", "z"]]) {
     }
 }
 run(join(here, "node_modules", ".bin", "tsc"), ["-p", here]);
+
+// Python's `View.to_html` puts these into pages of one file. Such a page has no addresses for modules, so each script is one text, and the worker's no module.
+const texts = {};
+for (const [name, format] of [["index", "es"], ["worker", "iife"]]) {
+    const bundle = await rolldown({ input: join(dist, `${name}.js`), external: /gpu\.js$/, logLevel: "silent" });
+    const { output } = await bundle.generate({ format, codeSplitting: false, minify: true });
+    texts[`${name}.js`] = Buffer.from(output[0].code);
+}
+const parts = { ...texts, "cpu_bg.wasm": readFileSync(join(dist, "cpu_bg.wasm")) };
+let end = 0;
+const places = Object.fromEntries(Object.entries(parts).map(([name, { length }]) => [name, [end, (end += length)]]));
+const table = Buffer.from(JSON.stringify(places));
+const length = Buffer.alloc(4);
+length.writeUInt32LE(table.length);
+const page = join(root, "python", "sheetsplat", "page.bin");
+// A wheel that is made meanwhile has the whole file, or none.
+writeFileSync(`${page}.new`, gzipSync(Buffer.concat([length, table, ...Object.values(parts)]), { level: 9 }));
+renameSync(`${page}.new`, page);

@@ -12,6 +12,8 @@ import atexit
 from typing import TYPE_CHECKING, Any
 
 from . import _native
+from ._colors import colormaps
+from ._native import __version__, presets
 from .comparison import Comparison, compare
 from .errors import (
     DeviceError,
@@ -28,7 +30,8 @@ from .errors import (
 from .image import Image
 from .part import Part, merge
 from .scene import Scene
-from .view import View, info, orbit, render, sweep
+from .turntable import orbit, sweep
+from .view import View, info, render
 from .volume import Volume
 
 __all__ = [
@@ -48,10 +51,13 @@ __all__ = [
     "View",
     "Volume",
     "VolumeError",
+    "__version__",
+    "colormaps",
     "compare",
     "info",
     "merge",
     "orbit",
+    "presets",
     "render",
     "sweep",
 ]

@@ -13,26 +13,39 @@ __all__ = [
     "Scene",
     "View",
     "Volume",
+    "__version__",
     "check_format",
     "check_golden",
     "check_outputs",
     "check_sizes",
+    "color_array",
+    "color_volume",
+    "colormap",
+    "colormaps",
     "compare",
     "elevation_and_center",
     "encode",
+    "eye",
+    "label_array",
     "merge",
+    "only",
     "open_image",
     "panned",
     "pixel",
     "placed",
+    "placement",
     "presets",
     "save",
     "split",
     "symbol",
     "tidy",
+    "value_range",
     "with_camera",
+    "with_colors",
     "write",
 ]
+
+__version__: str
 
 @final
 class BytesRead:
@@ -49,7 +62,7 @@ class Volume:
     def from_arrays(
         channels: list[NDArray[Any]],
         spacing: tuple[float, float, float],
-        labels: NDArray[Any] | None = None,
+        labels: NDArray[Any] | tuple[NDArray[Any], list[int]] | None = None,
         axes: list[list[float]] | None = None,
         origin: tuple[float, float, float] = ...,
         memory: str | None = None,
@@ -63,14 +76,15 @@ class Volume:
         selection: list[int | None],
         scene: Scene | None,
         bytes_read: BytesRead | None,
-        changes: tuple[tuple[float, float, float] | None, NDArray[Any] | None] | None = None,
+        changes: tuple[tuple[float, float, float] | None, NDArray[Any] | tuple[NDArray[Any], list[int]] | None] | None = None,
         index: str | PathLike[str] | None = None,
         series: str | None = None,
+        content: bytes | None = None,
     ) -> Volume: ...
     def replaced(
         self,
         spacing: tuple[float, float, float] | None = None,
-        labels: NDArray[Any] | None = None,
+        labels: NDArray[Any] | tuple[NDArray[Any], list[int]] | None = None,
         memory: str | None = None,
     ) -> Volume: ...
     @property
@@ -91,6 +105,8 @@ class Volume:
     def level(self) -> int: ...
     @property
     def channels(self) -> int: ...
+    @property
+    def labelled(self) -> bool: ...
     def values(self, channel: int) -> NDArray[np.float32]: ...
     def info(self) -> dict[str, Any]: ...
 
@@ -193,3 +209,21 @@ def placed(home: Scene, azimuth: float, elevation: float, zoom: float, center: t
 def panned(scene: Scene, volume: Volume, right: float, down: float) -> tuple[float, float, float]: ...
 def pixel(scene: Scene, volume: Volume) -> float: ...
 def with_camera(scene: Scene, other: Scene) -> Scene: ...
+def colormaps() -> list[str]: ...
+def colormap(name: str) -> list[list[float]] | None: ...
+def eye(
+    scene: Scene, volume: Volume, azimuth: float, elevation: float
+) -> tuple[tuple[float, float, float], tuple[float, float, float]]: ...
+def only(scene: Scene, volume: Volume, label: str) -> Scene: ...
+def value_range(volume: Volume) -> tuple[float, float]: ...
+def label_array(volume: Volume) -> NDArray[Any] | None: ...
+def placement(volume: Volume) -> tuple[list[list[float]], tuple[float, float, float]] | None: ...
+def color_volume(
+    colors: NDArray[np.float32],
+    kind: str,
+    spacing: tuple[float, float, float],
+    placement: tuple[list[list[float]], tuple[float, float, float]] | None,
+    unit: str | None,
+) -> Volume: ...
+def color_array(volume: Volume) -> NDArray[np.uint16] | None: ...
+def with_colors(volume: Volume, colors: NDArray[np.uint16]) -> Volume: ...

@@ -19,12 +19,14 @@ from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Unpack
 
 import dask
 from distributed import Client, Future, default_client, get_worker
 
+from . import _words as words
 from ._checks import finite, whole
+from ._settings import Backend, Settings, completed
 from .image import Image
 from .part import Part, merge
 from .scene import Scene
@@ -34,6 +36,7 @@ from .volume import _BUILTIN, Volume
 __all__ = ["orbit", "render"]
 
 
+@completed
 def render(
     source: Any,
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
@@ -42,12 +45,11 @@ def render(
     parts: int | None = None,
     spacing: float | Sequence[float] | None = None,
     labels: Any = None,
-    side: str | None = None,
-    backend: str = "cpu",
+    backend: Backend = "cpu",
     memory: int | str | None = None,
     index: str | os.PathLike[str] | None = None,
     light: str | os.PathLike[str] | None = None,
-    **settings: Any,
+    **settings: Unpack[Settings],
 ) -> Future:
     """Draws a picture by the workers of a Dask cluster.
 
@@ -62,7 +64,7 @@ def render(
         The cluster. Without it, the client that was made last.
     parts : int, optional
         The number of parts of about equal work. Without it, two for each thread of the workers.
-    spacing, labels, side, backend, **settings
+    spacing, labels, backend, **settings
         As for `View`.
     memory : int or str, optional
         Bytes that the values may take on each worker, such as ``"2GiB"``; without it, three quarters of a worker's limit.
@@ -88,10 +90,11 @@ def render(
     client = client or default_client()
     what, look = _sent(client, source, spacing, labels, scene, settings, memory, index, light)
     count = _count(client, parts)
-    start = _prepare(what, look, side, backend, False)
+    start = _prepare(what, look, backend, False)
     return client.compute(_picture(what, start, 0.0, count, backend), retries=3)
 
 
+@completed
 def orbit(
     source: Any,
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
@@ -103,18 +106,17 @@ def orbit(
     parts: int = 1,
     spacing: float | Sequence[float] | None = None,
     labels: Any = None,
-    side: str | None = None,
-    backend: str = "cpu",
+    backend: Backend = "cpu",
     memory: int | str | None = None,
     index: str | os.PathLike[str] | None = None,
     light: str | os.PathLike[str] | None = None,
-    **settings: Any,
+    **settings: Unpack[Settings],
 ) -> list[Future]:
     """Draws a turntable by the workers of a Dask cluster: a future for each picture.
 
     Parameters
     ----------
-    source, scene, client, spacing, labels, side, backend, memory, index, light, **settings
+    source, scene, client, spacing, labels, backend, memory, index, light, **settings
         As for `render`.
     count, turn, frames
         As for `View.orbit`.
@@ -129,7 +131,7 @@ def orbit(
     client = client or default_client()
     what, look = _sent(client, source, spacing, labels, scene, settings, memory, index, light)
     numbers, count_of_parts, turn = _frames(count, frames), _count(client, parts), finite("turn", turn)
-    start = _prepare(what, look, side, backend, True)
+    start = _prepare(what, look, backend, True)
     pictures = [_picture(what, start, turn / count * frame, count_of_parts, backend) for frame in numbers]
     futures: list[Future] = client.compute(pictures, retries=3)
     return futures
@@ -148,11 +150,11 @@ class _Source:
     index: str | os.PathLike[str] | None
     light: str | os.PathLike[str] | None
 
-    def view(self, scene: Scene, side: str | None, backend: str) -> View:
+    def view(self, scene: Scene, backend: Backend) -> View:
         # Every worker opens it for the same scene, which decides the level.
         memory = _limit() if self.memory is None else self.memory
         volume = _opened(self.what, self.look, self.spacing, self.labels, memory, False, self.index)
-        return View(volume, scene=scene, side=side, backend=backend, light=self.light)
+        return View(volume, scene=scene, backend=backend, light=self.light)
 
 
 def _limit() -> int | None:
@@ -167,12 +169,13 @@ def _sent(
     spacing: float | Sequence[float] | None,
     labels: Any,
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None,
-    settings: dict[str, Any],
+    settings: Settings,
     memory: int | str | None,
     index: str | os.PathLike[str] | None,
     light: str | os.PathLike[str] | None,
 ) -> tuple[Any, Scene]:
     """The source as the workers get it, sent once to each that needs it, and the scene, which is checked here."""
+    words.check_names(settings, words.ARGUMENTS)
     if isinstance(source, Volume):
         raise TypeError("a volume is not sent to other processes; give its path or its array")
     if isinstance(source, Scene) or _is_scene_file(source):
@@ -198,11 +201,11 @@ def _count(client: Client, parts: int | None) -> int:
     return whole("parts", parts, 1, 2**31 - 1)
 
 
-def _prepare(what: Any, look: Scene, side: str | None, backend: str, all_around: bool) -> Any:
-    return _task(_start, "start")(what, look, side, backend, all_around)
+def _prepare(what: Any, look: Scene, backend: Backend, all_around: bool) -> Any:
+    return _task(_start, "start")(what, look, backend, all_around)
 
 
-def _picture(what: Any, start: Any, degrees: float, count: int, backend: str) -> Any:
+def _picture(what: Any, start: Any, degrees: float, count: int, backend: Backend) -> Any:
     """The tasks of a picture. `View.split` gives ⌊√count⌋ regions, whose slab ranges follow one another."""
     pieces = _task(_split, "split")(what, start, degrees, count, backend)
     regions = math.isqrt(count)
@@ -240,7 +243,7 @@ _KEPT_LOCK = threading.Lock()
 
 
 @contextmanager
-def _view(what: _Source, look: Scene, side: str | None, backend: str) -> Iterator[View]:
+def _view(what: _Source, look: Scene, backend: Backend) -> Iterator[View]:
     with _KEPT_LOCK:
         kept = _KEPT.setdefault((what.token, backend), _Kept())
         _KEPT.move_to_end((what.token, backend))
@@ -248,25 +251,25 @@ def _view(what: _Source, look: Scene, side: str | None, backend: str) -> Iterato
             _KEPT.popitem(last=False)
     with kept.lock:
         if kept.view is None:
-            kept.view = what.view(look, side, backend)
+            kept.view = what.view(look, backend)
         else:
-            kept.view.scene = look if side is None else look.seen_from(kept.view.volume, side)
+            kept.view.scene = look
         yield kept.view
 
 
-def _start(what: _Source, look: Scene, side: str | None, backend: str, all_around: bool) -> Scene:
+def _start(what: _Source, look: Scene, backend: Backend, all_around: bool) -> Scene:
     """The scene with everything stated that depends on the volume, so that all workers draw the same."""
-    with _view(what, look, side, backend) as view:
-        return view.scene.explicit(view.volume, all_around=all_around)
+    with _view(what, look, backend) as view:
+        return look.explicit(view.volume, all_around=all_around)
 
 
-def _split(what: _Source, start: Scene, degrees: float, count: int, backend: str) -> tuple[Scene, list[dict[str, Any]]]:
+def _split(what: _Source, start: Scene, degrees: float, count: int, backend: Backend) -> tuple[Scene, list[dict[str, Any]]]:
     look = start.turned(degrees) if degrees != 0 else start
-    with _view(what, look, None, backend) as view:
+    with _view(what, look, backend) as view:
         return look, view.split(count)
 
 
-def _draw(what: _Source, pieces: tuple[Scene, list[dict[str, Any]]], number: int, backend: str) -> Part:
+def _draw(what: _Source, pieces: tuple[Scene, list[dict[str, Any]]], number: int, backend: Backend) -> Part:
     look, windows = pieces
-    with _view(what, look, None, backend) as view:
+    with _view(what, look, backend) as view:
         return view.part(**windows[number])

@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from . import _formats as formats
 from . import _native
 from ._checks import refused
 from .errors import ImageError, SceneError
@@ -90,7 +91,7 @@ class Image:
         ImageError
             If it holds no picture.
         """
-        array, made_on = _native.open_image(path)
+        array, made_on = _native.open_image(os.path.expanduser(os.fsdecode(path)))
         return cls._of(array, {}, made_on)
 
     @property
@@ -102,6 +103,24 @@ class Image:
     def height(self) -> int:
         """The number of rows."""
         return int(self._array.shape[0])
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """The number of rows, pixels per row, and channels, which are 4."""
+        return self.height, self.width, 4
+
+    def __getitem__(self, place: Any) -> Any:
+        """The pixels at some rows and columns, as of the array that `numpy.asarray` gives."""
+        return self._array[place]
+
+    def __eq__(self, other: object) -> bool:
+        import numpy as np
+
+        if not isinstance(other, Image):
+            return NotImplemented
+        return np.array_equal(self._array, other._array)
+
+    __hash__ = None  # type: ignore[assignment]
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         import numpy as np
@@ -126,7 +145,20 @@ class Image:
         """The picture as a ``PIL.Image.Image`` of mode RGBA. Needs Pillow."""
         import PIL.Image
 
-        return PIL.Image.fromarray(self.to_uint8(), "RGBA")
+        return PIL.Image.fromarray(self.to_uint8())
+
+    def show(self) -> None:
+        """Shows the picture: below the cell in a notebook, else in the machine's program for pictures, which needs Pillow."""
+        import sys
+
+        # Only what runs in IPython has loaded it.
+        shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+        if shell is not None and hasattr(shell, "kernel"):
+            from IPython.display import display
+
+            display(self)
+        else:
+            self.to_pil().show()
 
     def save(self, path: str | os.PathLike[str], *, depth: int = 8) -> None:
         """Saves the picture by the file's extension.
@@ -134,7 +166,8 @@ class Image:
         Parameters
         ----------
         path : path
-            ``.png`` (straight alpha), ``.exr`` or ``.npy`` (both ``float32``, premultiplied).
+            ``.png`` (straight alpha), ``.exr`` or ``.npy`` (both ``float32``, premultiplied); and by Pillow ``.jpg`` (of
+            opaque pixels), ``.tif`` and ``.webp`` (without loss), of 8 bits with straight alpha.
         depth : {8, 16}
             Bits per channel of a PNG.
 
@@ -149,7 +182,14 @@ class Image:
         """
         if depth not in (8, 16):
             raise refused(SceneError, "depth", repr(depth), "8 or 16 bits per channel")
-        _native.save(self._array, path, depth, self._inputs)
+        name = os.path.expanduser(os.fsdecode(path))
+        kind = formats.kind_of(name)
+        if kind is not None:
+            _native.check_outputs([name], self._inputs)
+            _native.write(name, formats.encoded(self.to_uint8(), name, kind, depth), self._inputs)
+            return
+        formats.check(name)
+        _native.save(self._array, name, depth, self._inputs)
 
     def __reduce__(self) -> Any:
         # The files that were read matter in this process alone.

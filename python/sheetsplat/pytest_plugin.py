@@ -6,36 +6,30 @@ Rust macro ``assert_golden!``::
     def test_head(golden):
         golden(sheetsplat.render("builtin:head:48"), "head")
 
-``SHEETSPLAT_BLESS=all pytest``, or the names of goldens separated by commas, makes a picture the golden if it fails or
-has no golden yet. The files of a failure lie under ``--golden-output``, with a page ``index.html`` of all of them, whether
-one process ran the tests or the workers of pytest-xdist did.
+``pytest --golden-bless`` makes a picture the golden if it fails or has no golden yet, in all tests that run; so does
+``SHEETSPLAT_BLESS=all``, and with names of goldens separated by commas only these. The files of a failure lie under
+``--golden-output``, with a page ``index.html`` of all of them, whether one process ran the tests or the workers of
+pytest-xdist did. ``--golden-report FILE`` writes one page of all comparisons with the pictures inside.
 """
 
 from __future__ import annotations
 
-import html
 import os
-import shutil
+import sys
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pytest
 
+from ._golden_page import Compared, page
+
 #: What a worker of pytest-xdist sends its controller at its end, by this name.
-_SENT = "sheetsplat_golden_failures"
+_SENT = "sheetsplat_goldens"
 
+#: The variable that names the goldens to bless.
+_BLESS = "SHEETSPLAT_BLESS"
 
-class _Failure(NamedTuple):
-    """A golden that failed; texts alone, so that it can be sent to another process."""
-
-    name: str
-    test: str
-    golden: str
-    left_in: str
-    report: str
-
-
-_FAILURES = pytest.StashKey["list[_Failure]"]()
+_COMPARED = pytest.StashKey["list[Compared]"]()
 
 
 class Golden:
@@ -44,8 +38,17 @@ class Golden:
     Call it with a picture and the golden's name.
     """
 
-    def __init__(self, folder: Path, output: Path, test: str, failures: list[_Failure]) -> None:
-        self._folder, self._output, self._test, self._failures = folder, output, test, failures
+    def __init__(self, file: Path, shown: str, output: Path, test: str, compared: list[Compared]) -> None:
+        self._file, self._shown, self._output, self._test, self._compared = file, shown, output, test, compared
+        self._folder = file.parent / "goldens"
+
+    def _place(self) -> str:
+        """The line of the test's file that compares now, or the file if a helper elsewhere does so without it."""
+        frame = sys._getframe(2)
+        while frame.f_back is not None and frame.f_code.co_filename != str(self._file):
+            frame = frame.f_back
+        is_found = frame.f_code.co_filename == str(self._file)
+        return f"{self._shown}:{frame.f_lineno}" if is_found else self._shown
 
     def __call__(
         self,
@@ -91,10 +94,11 @@ class Golden:
         )
         if blessed:
             print(f"blessed {self._folder / name}.png")
+        place, golden = self._place(), str(self._folder / f"{name}.png")
+        one = Compared(name, self._test, place, golden, str(self._output), report or "", blessed)
+        self._compared.append(one)
         if report is not None:
-            golden = self._folder / f"{name}.png"
-            self._failures.append(_Failure(name, self._test, str(golden), str(self._output), report))
-            pytest.fail(report, pytrace=False)
+            pytest.fail(f"{place}: {report}", pytrace=False)
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -105,10 +109,35 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         default="golden-failures",
         help="folder for the pictures and reports of golden images that failed, below the root folder",
     )
+    group.addoption(
+        "--golden-bless",
+        action="store_true",
+        help=f"make each picture the golden that fails or has none yet, as {_BLESS}=all does",
+    )
+    group.addoption(
+        "--golden-report",
+        metavar="FILE",
+        help="write one page with all pictures that were compared inside it, below the root folder",
+    )
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.stash[_FAILURES] = []
+    config.stash[_COMPARED] = []
+    if not config.getoption("--golden-bless"):
+        return
+    named = os.environ.get(_BLESS)
+    if named not in (None, "", "all"):
+        raise pytest.UsageError(f"--golden-bless: found {_BLESS}={named} beside it, allowed: one of the two")
+    # The library reads it, also in the workers of pytest-xdist, which inherit it.
+    os.environ[_BLESS] = "all"
+
+    def restore() -> None:
+        if named is None:
+            os.environ.pop(_BLESS, None)
+        else:
+            os.environ[_BLESS] = named
+
+    config.add_cleanup(restore)
 
 
 def _output(config: pytest.Config) -> Path:
@@ -121,14 +150,14 @@ def golden(request: pytest.FixtureRequest) -> Golden:
     path, root = request.path, request.config.rootpath
     place = path.relative_to(root) if path.is_relative_to(root) else Path(path.name)
     output = _output(request.config) / place.with_suffix("")
-    return Golden(path.parent / "goldens", output, request.node.nodeid, request.config.stash[_FAILURES])
+    return Golden(path, str(place), output, request.node.nodeid, request.config.stash[_COMPARED])
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node: Any, error: object) -> None:
-    """Takes over the failures of a worker of pytest-xdist. One that was killed sends none."""
+    """Takes over the comparisons of a worker of pytest-xdist. One that was killed sends none."""
     sent = getattr(node, "workeroutput", {}).get(_SENT, [])
-    node.config.stash[_FAILURES] += [_Failure(*failure) for failure in sent]
+    node.config.stash[_COMPARED] += [Compared(*one) for one in sent]
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
@@ -136,49 +165,35 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     if config.option.collectonly:
         # Nothing was compared, so that the page of the last run still holds.
         return
-    output, failures = _output(config), config.stash[_FAILURES]
+    output, compared = _output(config), config.stash[_COMPARED]
     if hasattr(config, "workeroutput"):
-        # The controller makes the page, which shows the failures of all workers.
-        config.workeroutput[_SENT] = [tuple(failure) for failure in failures]
+        # The controller makes the page, which shows the comparisons of all workers.
+        config.workeroutput[_SENT] = [tuple(one) for one in compared]
         return
-    page = output / "index.html"
+    index = output / "index.html"
+    failures = [one for one in compared if one.report]
     if failures:
-        output.mkdir(parents=True, exist_ok=True)
-        page.write_text(_page(failures, output), encoding="utf-8")
-    elif page.exists():
-        page.unlink()
+        _write(index, page(failures, output, is_whole=False))
+    elif index.exists():
+        index.unlink()
+    report = _report(config)
+    if report is not None:
+        _write(report, page(compared, report.parent, is_whole=True))
+
+
+def _report(config: pytest.Config) -> Path | None:
+    named = config.getoption("--golden-report")
+    return None if named is None else config.rootpath / str(named)
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
-    if config.stash[_FAILURES]:
+    report = _report(config)
+    if report is not None:
+        terminalreporter.write_line(f"golden images that were compared: {report}")
+    if any(one.report for one in config.stash[_COMPARED]):
         terminalreporter.write_line(f"golden images that failed: {_output(config) / 'index.html'}")
-
-
-def _page(failures: list[_Failure], output: Path) -> str:
-    sections = "\n".join(_section(failure, output) for failure in failures)
-    return f"""<!doctype html>
-<meta charset="utf-8">
-<title>Golden images that failed</title>
-<style>
-body {{ font: 14px sans-serif; margin: 2em; }}
-figure {{ display: inline-block; margin: 0 1em 1em 0; }}
-img {{ image-rendering: pixelated; max-width: 30vw; background: #888; }}
-</style>
-<h1>Golden images that failed</h1>
-{sections}
-"""
-
-
-def _section(failure: _Failure, output: Path) -> str:
-    left = Path(failure.left_in)
-    # The page stays complete when the folder is copied elsewhere, for instance from a CI run.
-    copy = left / f"{failure.name}-golden.png"
-    if Path(failure.golden).exists():
-        shutil.copyfile(failure.golden, copy)
-    kinds = {"golden": copy, "actual": left / f"{failure.name}-actual.png", "difference": left / f"{failure.name}-difference.png"}
-    figures = "\n".join(
-        f'<figure><img src="{html.escape(os.path.relpath(path, output))}" alt="{kind}"><figcaption>{kind}</figcaption></figure>'
-        for kind, path in kinds.items()
-        if path.exists()
-    )
-    return f"<h2>{html.escape(failure.test)}: {html.escape(failure.name)}</h2>\n{figures}\n<pre>{html.escape(failure.report)}</pre>"

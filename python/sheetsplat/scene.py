@@ -6,13 +6,15 @@ import os
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from . import _native as native
+from . import _words as words
 from ._checks import finite, names, refused
 from ._loading import loading
+from ._settings import Settings, Side, completed
 from .errors import FileError, SceneError
-from .volume import Volume, _memory
+from .volume import Origin, Volume, _memory
 
 __all__ = ["Scene"]
 
@@ -28,7 +30,29 @@ class Scene:
     **settings
         Settings over those of `source`: the tables of a scene file as dictionaries (``camera={"up": [0, 1, 0]}``),
         and ``preset``. A key may also be a path: ``{"camera.up": [0, 1, 0]}``. Numbers, lists, tuples and NumPy
-        arrays are all allowed where a scene file has numbers.
+        arrays are all allowed where a scene file has numbers. Beside them words, each of which is some of these keys:
+
+        cmap, colormap : name, colour map of matplotlib, or colours
+            ``transfer.colormap``, or ``transfer.color`` over `clim`; over the visible values without it.
+        clim : two numbers; vmin, vmax : number
+            The values over which `cmap` and `opacity` lie. Without `opacity`, ``transfer.opacity`` rises from 0 to 1.
+        opacity : ``"sigmoid"``, ``"linear"``, ``"linear_r"``, numbers, or pairs of a value and its opacity
+            ``transfer.opacity``, over `clim`; over all values without it.
+        background : colour
+            ``image.background``.
+        size : int or two ints
+            ``image.width`` and ``image.height``.
+        view, side : name
+            ``camera.direction`` and ``camera.up``: a side of the patient (``"front"``, ``"back"``, ``"left"``,
+            ``"right"``, ``"top"``, ``"bottom"``), or by the volume's axes ``"iso"``, ``"xy"``, ``"xz"``, ``"yz"``,
+            ``"yx"``, ``"zx"``, ``"zy"``, of which the first points right and the second up.
+        azimuth, elevation : degrees
+            ``camera.direction`` and ``camera.up``: the eye goes to the right and then up, from where it would be.
+        zoom : number above 0
+            ``camera.height`` (in perspective ``distance``) of the framed picture, divided by this.
+        only : str or int
+            ``transfer.label`` with ``visible = false`` for all labels but this one, given by its name or its number; of a
+            label map, ``transfer.iso_ranges``.
 
     Raises
     ------
@@ -49,33 +73,78 @@ class Scene:
     """
 
     # A scene does not change: to assign a setting would do nothing.
-    __slots__ = ("__weakref__", "_native")
-    _native: native.Scene
+    __slots__ = ("__weakref__", "_bare", "_stated", "_unknown", "_words")
+    #: The scene without its words.
+    _bare: native.Scene
+    _words: dict[str, words.Said]
+    #: The scene with the words that are keys without the volume, and the names of the others.
+    _stated: native.Scene
+    _unknown: list[str]
 
+    @completed
     def __init__(
-        self, source: str | os.PathLike[str] | Mapping[str, Any] | Scene | None = None, /, **settings: Any
+        self,
+        source: str | os.PathLike[str] | Mapping[str, Any] | Scene | None = None,
+        /,
+        **settings: Unpack[Settings],
     ) -> None:
+        words.check_names(settings, words.SETTINGS)
+        said, keys = words.split(_flat(settings))
         if isinstance(source, Scene):
-            self._native = source._native.replaced(settings)
+            self._keep(source._bare.replaced(keys), words.merged(source._words, said, keys))
             return
-        if source is None or isinstance(source, Mapping):
-            text, origin, folder = "", "scene", "."
-            settings = {**_flat(source or {}), **_flat(settings)}
+        before: dict[str, words.Said] = {}
+        text, origin, folder = "", "scene", "."
+        if isinstance(source, Mapping):
+            words.check_names(source, words.SETTINGS)
+            before, stated = words.split(_flat(source))
+            before, keys = words.merged(before, said, keys), {**stated, **keys}
+            said = {}
         elif isinstance(source, str) and ("\n" in source or "=" in source):
-            text, origin, folder = source, "scene", "."
+            text = source
         elif isinstance(source, (str, os.PathLike)):
-            text, origin, folder = _read(os.fspath(source))
-        else:
+            text, origin, folder = _read(os.path.expanduser(os.fspath(source)))
+        elif source is not None:
             raise refused(SceneError, "scene", type(source).__name__, "a text, a path, a mapping or a Scene")
-        self._native = native.Scene(text, origin, folder, settings)
+        self._keep(native.Scene(text, origin, folder, keys), words.merged(before, said, ()))
+
+    def _keep(self, bare: native.Scene, said: dict[str, words.Said]) -> None:
+        self._bare, self._words = words.plain(bare, said)
+        self._stated, self._unknown = words.stated(self._bare, self._words)
 
     @classmethod
     def _of(cls, checked: native.Scene) -> Scene:
         scene = cls.__new__(cls)
-        scene._native = checked
+        scene._keep(checked, {})
         return scene
 
-    def replace(self, **settings: Any) -> Scene:
+    @property
+    def _native(self) -> native.Scene:
+        """The scene, if no word depends on the volume."""
+        if self._unknown:
+            said = ", ".join(self._unknown)
+            found = "a word that depends on the volume" if len(self._unknown) == 1 else "words that depend on the volume"
+            raise refused(SceneError, said, found, "a scene for a volume: scene.explicit(volume), or View(volume, ...).scene")
+        return self._stated
+
+    def _for(self, volume: Volume, *, all_around: bool = False, annotate: Sequence[str] = ()) -> Scene:
+        """The scene with all its words as keys, for a volume."""
+        if not self._words:
+            return self
+        return Scene._of(words.settled(self._bare, self._words, volume._native, all_around, annotate))
+
+    @property
+    def _opening(self) -> native.Scene:
+        """The scene that chooses the level of a volume: a magnified picture has smaller pixels, as a larger one has."""
+        zoom = self._words["zoom"].value if "zoom" in self._words else 1.0
+        if zoom == 1.0:
+            return self._stated
+        image = tomllib.loads(self._stated.to_toml("."))["image"]
+        sizes = {f"image.{key}": min(max(round(image[key] * zoom), 1), 2**31 - 1) for key in ("width", "height")}
+        return self._stated.replaced(sizes)
+
+    @completed
+    def replace(self, **settings: Unpack[Settings]) -> Scene:
         """The same scene with other settings over it; this one does not change.
 
         Parameters
@@ -93,7 +162,7 @@ class Scene:
     @property
     def names_volume(self) -> bool:
         """Whether ``volume.path`` or ``volume.builtin`` is stated."""
-        return self._native.names_volume
+        return self._stated.names_volume
 
     def load_volume(
         self,
@@ -115,7 +184,10 @@ class Scene:
             The volume.
         """
         with loading(None, progress) as bytes_read:
-            return Volume._of(self._native.load_volume(_memory(memory), bytes_read, index))
+            opened = self._opening.load_volume(_memory(memory), bytes_read, index)
+        of_index = None if index is None else os.path.abspath(os.fsdecode(index))
+        # With the paths that its relative ones are now.
+        return Volume._of(opened, Origin(_restored(*self.__reduce__()[1]), memory, of_index))
 
     def explicit(
         self, volume: Volume, *, all_around: bool = False, annotate: str | Sequence[str] = ()
@@ -136,7 +208,9 @@ class Scene:
         Scene
             The scene, which draws the same picture wherever its volume is drawn.
         """
-        return Scene._of(self._native.explicit(volume._native, all_around, names(annotate)))
+        beside = names(annotate)
+        scene = self._for(volume, all_around=all_around, annotate=beside)
+        return Scene._of(scene._native.explicit(volume._native, all_around, beside))
 
     def turned(self, degrees: float) -> Scene:
         """The scene with its camera turned about ``camera.up``.
@@ -153,7 +227,7 @@ class Scene:
         """
         return Scene._of(self._native.turned(finite("turn", degrees)))
 
-    def seen_from(self, volume: Volume, side: str) -> Scene:
+    def seen_from(self, volume: Volume, side: Side) -> Scene:
         """The scene with its camera on a side of the patient.
 
         Parameters
@@ -168,7 +242,7 @@ class Scene:
         Scene
             The other scene.
         """
-        return Scene._of(self._native.seen_from(volume._native, side))
+        return self.replace(side=side)._for(volume)
 
     def to_toml(self, folder: str | os.PathLike[str] = ".") -> str:
         """The text of a scene file.
@@ -210,19 +284,26 @@ class Scene:
 
     def __reduce__(self) -> Any:
         folder = os.getcwd()
-        return _restored, (self.to_toml(folder), folder)
+        return _restored, (self._bare.to_toml(folder), folder, self._words)
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Scene) and self._native == other._native
+        if not isinstance(other, Scene):
+            return False
+        # Words that are keys already are the same scene as these keys.
+        ours, others = (scene._words if scene._unknown else {} for scene in (self, other))
+        return self._stated == other._stated and ours == others
 
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
-        return f"<sheetsplat.Scene\n{self.to_toml()}>"
+        said = "".join(f" {word.name}={word.value!r}" for word in self._words.values() if word.name in self._unknown)
+        return f"<sheetsplat.Scene{said}\n{self._stated.to_toml('.')}>"
 
 
-def _restored(text: str, folder: str) -> Scene:
-    return Scene._of(native.Scene(text, "scene", folder, {}))
+def _restored(text: str, folder: str, said: dict[str, words.Said]) -> Scene:
+    scene = Scene.__new__(Scene)
+    scene._keep(native.Scene(text, "scene", folder, {}), said)
+    return scene
 
 
 def _flat(table: Mapping[Any, Any], path: str = "") -> dict[Any, Any]:

@@ -1,24 +1,24 @@
-"""Pictures of volumes: one, many of one volume, turntables and sweeps."""
+"""Pictures of a volume: one, or many of a view."""
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
-import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Unpack
 
-from . import _movies as movies
 from . import _native as native
+from . import _stores as stores
+from . import _words as words
 from ._checks import finite, names, refused, whole
-from .errors import ImageError, SceneError
+from ._settings import Arguments, Backend, Settings, completed
+from .errors import SceneError
 from .image import Image
 from .part import Part, merge
 from .scene import Scene
 from .volume import Volume, _open, _spacing
 
-__all__ = ["View", "info", "orbit", "render", "sweep"]
+__all__ = ["View", "info", "render"]
 
 _SCENE_FILE = ".toml"
 
@@ -39,8 +39,6 @@ class View:
         As for `Volume`.
     scene : Scene, mapping, str or path, optional
         How it is drawn: a scene, or what `Scene` takes. A volume that it names is ignored.
-    side : str, optional
-        The side of the patient to look at, as for `Scene.seen_from`.
     backend : str
         ``"cpu"`` needs no driver and gives the same bytes on every machine; ``"gpu"``; ``"auto"``, a GPU if there is
         one; or ``"reference"``, slow and in 64 bits.
@@ -59,7 +57,8 @@ class View:
     light : str or path, optional
         Light sheets that `save_light` or ``sheetsplat light`` has made of the same scene: the same pictures, sooner.
     **settings
-        Settings over those of `scene`, as for `Scene`.
+        Settings over those of `scene`, and words for some of them, as for `Scene`: `cmap`, `clim`, `opacity`,
+        `background`, `size`, `view`, `azimuth`, `elevation`, `zoom`, `only`.
 
     Examples
     --------
@@ -72,8 +71,13 @@ class View:
     """
 
     # Settings are changed by `set`: to assign one would do nothing.
-    __slots__ = ("__weakref__", "_annotate", "_inputs", "_native", "_scene", "_volume")
+    __slots__ = ("__weakref__", "_annotate", "_inputs", "_native", "_scene", "_stated", "_volume")
 
+    #: The scene as it was stated, with its words, and as it is drawn, with all of them as keys.
+    _stated: Scene
+    _scene: Scene
+
+    @completed
     def __init__(
         self,
         source: Any,
@@ -81,22 +85,20 @@ class View:
         spacing: float | Sequence[float] | None = None,
         labels: Any = None,
         scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
-        side: str | None = None,
-        backend: str = "cpu",
+        backend: Backend = "cpu",
         adapter: str | None = None,
         memory: int | str | None = None,
         progress: bool = True,
         index: str | os.PathLike[str] | None = None,
         annotate: str | Sequence[str] = (),
         light: str | os.PathLike[str] | None = None,
-        **settings: Any,
+        **settings: Unpack[Settings],
     ) -> None:
-        volume, look = _what_and_how(source, spacing, labels, scene, settings, memory, progress, index)
-        if side is not None:
-            look = look.seen_from(volume, side)
-        self._volume, self._scene = volume, look
-        self._annotate = names(annotate)
-        self._native = native.View(volume._native, look._native, backend, adapter, self._annotate, light)
+        words.check_names(settings, words.ARGUMENTS)
+        volume, self._stated = _what_and_how(source, spacing, labels, scene, settings, memory, progress, index)
+        self._volume, self._annotate = volume, names(annotate)
+        self._scene = self._stated._for(volume, annotate=self._annotate)
+        self._native = native.View(volume._native, self._scene._native, backend, adapter, self._annotate, light)
         self._inputs = [volume._native.inputs]
 
     @property
@@ -106,20 +108,27 @@ class View:
 
     @property
     def scene(self) -> Scene:
-        """The settings. Assigning other ones changes the next picture."""
+        """The settings, with all words as the keys that they are for the volume. Assigning other ones changes the next picture."""
         return self._scene
 
     @scene.setter
     def scene(self, scene: Scene) -> None:
-        self._native.set_scene(scene._native)
-        self._scene = scene
+        drawn = scene._for(self._volume, annotate=self._annotate)
+        self._native.set_scene(drawn._native)
+        self._stated, self._scene = scene, drawn
+
+    def _with(self, **settings: Unpack[Settings]) -> Scene:
+        """The scene as it was stated, with other settings over it."""
+        words.check_names(settings, words.SETTINGS)
+        return self._stated.replace(**settings)
 
     @property
     def backend(self) -> str:
         """The backend that draws: ``"cpu"``, ``"gpu"`` or ``"reference"``."""
         return self._native.backend
 
-    def set(self, **settings: Any) -> None:
+    @completed
+    def set(self, **settings: Unpack[Settings]) -> None:
         """Changes settings. If one is not allowed, nothing changes.
 
         Parameters
@@ -132,7 +141,7 @@ class View:
         SceneError
             If a key is unknown, a value is not allowed, or the backend does not draw it.
         """
-        self.scene = self._scene.replace(**settings)
+        self.scene = self._with(**settings)
 
     def save_light(self, path: str | os.PathLike[str]) -> None:
         """Saves the view's light sheets, for `View` with ``light``, and ``sheetsplat render --light``.
@@ -149,7 +158,8 @@ class View:
         """
         self._native.save_light(path, self._inputs)
 
-    def render(self, **settings: Any) -> Image:
+    @completed
+    def render(self, **settings: Unpack[Settings]) -> Image:
         """Draws a picture.
 
         Parameters
@@ -175,6 +185,30 @@ class View:
             self.set(**settings)
         array, stats, made_on = self._native.draw()
         return Image._of(array, json.loads(stats), made_on, self._inputs)
+
+    def to_html(self, path: str | os.PathLike[str]) -> None:
+        """Saves a page of one file, in which the volume turns in any browser, without a network.
+
+        The page has the library for the CPU in it, which takes 0.9 MB, and the volume with its labels. Words beside the
+        picture (`annotate`) are left out.
+
+        Parameters
+        ----------
+        path : path
+            The file, ``.html``.
+
+        Raises
+        ------
+        FileError
+            If the package was made without the page's files, or the file cannot be written.
+        VolumeError
+            If the volume is streamed, or has more than 134 million values.
+        """
+        from ._page import page
+
+        start = self._stated.explicit(self._volume, all_around=True)
+        text = page(self._volume, start, self.render()._repr_png_())
+        native.write(os.path.expanduser(os.fspath(path)), text.encode(), self._inputs)
 
     def part(
         self,
@@ -251,7 +285,7 @@ class View:
             The pictures in their order.
         """
         frames, turn = _frames(count, frames), finite("turn", turn)
-        start = self._scene.explicit(self._volume, all_around=True, annotate=self._annotate)
+        start = self._stated.explicit(self._volume, all_around=True, annotate=self._annotate)
         return self._turns(start, frames, turn / count)
 
     def _turns(self, start: Scene, frames: range, step: float) -> Iterator[Image]:
@@ -268,7 +302,7 @@ def _what_and_how(
     spacing: float | Sequence[float] | None,
     labels: Any,
     scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None,
-    settings: dict[str, Any],
+    settings: Settings,
     memory: int | str | None,
     progress: bool,
     index: str | os.PathLike[str] | None = None,
@@ -300,11 +334,12 @@ def _opened(
     index: str | os.PathLike[str] | None = None,
 ) -> Volume:
     """The volume that a scene names, or another source's for a scene that may choose its level."""
+    place = None if isinstance(source, Scene) else stores.located(source)
+    if place is not None:
+        steps = None if spacing is None else _spacing(spacing)
+        return _open(place, memory, progress, [None, None, None], look._opening, steps, labels, index)
     if isinstance(source, Scene):
         volume = source.load_volume(memory=memory, progress=progress, index=index)
-    elif isinstance(source, (str, os.PathLike)):
-        steps = None if spacing is None else _spacing(spacing)
-        return Volume._of(_open(source, memory, progress, [None, None, None], look._native, steps, labels, index))
     elif isinstance(source, Volume):
         volume = source
     else:
@@ -338,7 +373,8 @@ def _frames(count: int, frames: range | None) -> range:
     return frames
 
 
-def render(source: Any, **arguments: Any) -> Image:
+@completed
+def render(source: Any, **arguments: Unpack[Arguments]) -> Image:
     """Draws one picture.
 
     Parameters
@@ -346,8 +382,8 @@ def render(source: Any, **arguments: Any) -> Image:
     source
         What is drawn: an array ``[z, y, x]``, an image of SimpleITK or nibabel, a path, a `Volume` or a `Scene`.
     **arguments
-        As for `View`: `spacing`, `labels`, `scene`, `side`, `backend`, `adapter`, `memory`, `progress`, `index`,
-        `annotate`, `light`, and settings.
+        As for `View`: `spacing`, `labels`, `scene`, `backend`, `adapter`, `memory`, `progress`, `index`, `annotate`,
+        `light`, and settings or words as for `Scene`: `preset`, `cmap`, `clim`, `opacity`, `size`, `view`, ...
 
     Returns
     -------
@@ -364,128 +400,6 @@ def render(source: Any, **arguments: Any) -> Image:
     (64, 64, 4)
     """
     return View(source, **arguments).render()
-
-
-def orbit(
-    source: Any,
-    output: str | os.PathLike[str] | None = None,
-    *,
-    count: int = 120,
-    turn: float = 360.0,
-    frames: range | None = None,
-    fps: float = 30,
-    progress: bool = True,
-    **arguments: Any,
-) -> Iterator[Image] | None:
-    """Draws a turntable: an iterator of pictures, or files.
-
-    Parameters
-    ----------
-    source
-        What is drawn, as for `View`.
-    output : path, optional
-        Numbered pictures (``frame-%04d.png``, ``frame-####.exr``), or a movie (``.gif``, ``.apng``, ``.webp``), which
-        needs Pillow. Without it, an iterator of pictures is returned, and each is drawn when it is asked for.
-    count, turn, frames
-        As for `View.orbit`.
-    fps : float
-        Pictures per second of a movie.
-    progress : bool
-        Show bars while the volume is read and files are written, if tqdm is installed.
-    **arguments
-        As for `View`.
-
-    Yields
-    ------
-    Image
-        The pictures in their order, if no output is given.
-
-    Notes
-    -----
-    Ctrl-C stops at once: numbered pictures that are complete stay, a movie is not written. A file that is read is never
-    written: nothing is drawn then, and a `VolumeError` is raised.
-    """
-    numbers = _frames(count, frames)
-    if output is None:
-        return View(source, progress=progress, **arguments).orbit(count=count, turn=turn, frames=frames)
-    path = os.fspath(output)
-    if movies.is_movie(path):
-        paths, save = [path], movies.writer(path, len(numbers), fps)
-    else:
-        paths, save = _numbered(path, numbers)
-    view = View(source, progress=progress, **arguments)
-    native.check_outputs(paths, view._inputs)
-    save(_shown(view.orbit(count=count, turn=turn, frames=frames), len(numbers), progress))
-    return None
-
-
-def _numbered(output: str, numbers: range) -> tuple[list[str], Callable[[Iterator[Image]], None]]:
-    """Numbered files, whose pattern is checked before anything is drawn, and what saves pictures as them."""
-    folder, name = os.path.split(output)
-    numbered = re.fullmatch(r"([^%#]*)(%d|%0\d{1,2}d|#{1,20})([^%#]*)", name)
-    if numbered is None:
-        allowed = f"numbered pictures (frame-%04d.png, frame-####.png) or a movie ({', '.join(movies.KINDS)})"
-        raise refused(ImageError, "output", output, allowed)
-    before, number, after = numbered.groups()
-    number = f"%0{len(number)}d" if number.startswith("#") else number
-    pattern = os.path.join(folder.replace("%", "%%"), before + number + after)
-    native.check_format(pattern % 0)
-    paths = [pattern % frame for frame in numbers]
-
-    def save(pictures: Iterator[Image]) -> None:
-        for path, image in zip(paths, pictures, strict=True):
-            image.save(path)
-
-    return paths, save
-
-
-def _shown(pictures: Iterator[Image], count: int, progress: bool) -> Iterator[Image]:
-    if not progress:
-        return pictures
-    try:
-        from tqdm.auto import tqdm
-    except ImportError:
-        return pictures
-    bar: Iterator[Image] = iter(tqdm(pictures, total=count, unit="picture", leave=False))
-    return bar
-
-
-def sweep(
-    source: Any, values: Mapping[str, Sequence[Any]], **arguments: Any
-) -> Iterator[tuple[dict[str, Any], Image]]:
-    """Draws a picture for every combination of values of some settings.
-
-    Parameters
-    ----------
-    source
-        What is drawn, as for `View`.
-    values : mapping
-        The values of each setting, by its key.
-    **arguments
-        As for `View`.
-
-    Yields
-    ------
-    tuple of dict and Image
-        The settings of a picture, by their keys, and the picture.
-
-    Examples
-    --------
-    >>> pictures = sweep("builtin:head:16", {"splatting.slab_width": [0.5, 1, 2]}, image={"width": 16, "height": 16})
-    >>> [settings["splatting.slab_width"] for settings, image in pictures]
-    [0.5, 1, 2]
-    """
-    view = View(source, **arguments)
-    # All scenes are checked before the first is drawn.
-    combinations = [dict(zip(values, chosen, strict=True)) for chosen in itertools.product(*values.values())]
-    scenes = [(settings, view.scene.replace(**settings)) for settings in combinations]
-    return _swept(view, scenes)
-
-
-def _swept(view: View, scenes: list[tuple[dict[str, Any], Scene]]) -> Iterator[tuple[dict[str, Any], Image]]:
-    for settings, scene in scenes:
-        view.scene = scene
-        yield settings, view.render()
 
 
 def info(

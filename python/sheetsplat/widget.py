@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 try:
     import anywidget
@@ -20,6 +20,8 @@ except ImportError as error:
     raise ImportError("sheetsplat.Widget needs anywidget: pip install 'sheetsplat[jupyter]'") from error
 
 from . import _native as native
+from . import _words as words
+from ._settings import Backend, Settings, completed
 from .errors import SceneError, SheetsplatError
 from .image import Image
 from .painter import Painter
@@ -49,7 +51,7 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
 
     Parameters
     ----------
-    source, spacing, labels, scene, side, backend, adapter, **settings
+    source, spacing, labels, scene, backend, adapter, **settings
         As for `View`. The object keeps its size in all directions, as in a turntable.
 
     Attributes
@@ -89,6 +91,7 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
     _size = traitlets.Tuple(traitlets.Int(), traitlets.Int()).tag(sync=True)
     _problem = traitlets.Unicode("").tag(sync=True)
 
+    @completed
     def __init__(
         self,
         source: Any,
@@ -96,17 +99,15 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
         spacing: float | Sequence[float] | None = None,
         labels: Any = None,
         scene: Scene | Mapping[str, Any] | str | os.PathLike[str] | None = None,
-        side: str | None = None,
-        backend: str = "cpu",
+        backend: Backend = "cpu",
         adapter: str | None = None,
-        **settings: Any,
+        **settings: Unpack[Settings],
     ) -> None:
         view = View(
             source,
             spacing=spacing,
             labels=labels,
             scene=scene,
-            side=side,
             backend=backend,
             adapter=adapter,
             **settings,
@@ -114,9 +115,9 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
         self._volume, self._backend = view.volume, view.backend
         self._painter = Painter(view, self._show, self._fail)
         #: The scene as Python stated it.
-        self._stated = view.scene
+        self._stated = view._stated
         #: The same with everything stated that depends on the volume, and the camera that the traits start from.
-        self._home = view.scene.explicit(view.volume, all_around=True)
+        self._home = self._stated.explicit(view.volume, all_around=True)
         self._is_placing = False
         #: Whether the browser keeps its next message back until a picture comes.
         self._is_awaited = False
@@ -142,7 +143,7 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
 
         Assigning other ones changes the picture, and the camera to what they state.
         """
-        return Scene._of(native.with_camera(self._stated._native, self._placed()._native))
+        return Scene._of(native.with_camera(self._stated._for(self._volume)._native, self._placed()._native))
 
     @scene.setter
     def scene(self, scene: Scene) -> None:
@@ -153,7 +154,8 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
         """The whole picture of the scene; waits until it is drawn, and raises what kept it from being drawn."""
         return self._painter.whole()
 
-    def set(self, **settings: Any) -> None:
+    @completed
+    def set(self, **settings: Unpack[Settings]) -> None:
         """Changes settings. If one is not allowed, nothing changes.
 
         The camera stays where it is, unless a setting of the camera is among them: then it is where the settings state
@@ -164,7 +166,7 @@ class Widget(anywidget.AnyWidget):  # type: ignore[misc]
         **settings
             Settings over those of the widget, as for `Scene`.
         """
-        states_camera = any(key.split(".")[0] == "camera" for key in settings)
+        states_camera = any(key.split(".")[0] == "camera" or key in words.OF_CAMERA for key in settings)
         self._state(self._stated.replace(**settings), keeps_camera=not states_camera)
 
     def _state(self, stated: Scene, *, keeps_camera: bool) -> None:

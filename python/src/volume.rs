@@ -19,7 +19,7 @@ use crate::scene::Scene;
 use crate::warnings;
 
 /// The name of volumes from arrays in errors.
-const ORIGIN: &str = "array";
+pub(crate) const ORIGIN: &str = "array";
 
 /// What the names of builtin volumes begin with, where paths are allowed too.
 const BUILTIN: &str = "builtin:";
@@ -49,7 +49,7 @@ impl Volume {
     }
 
     /// The volume, which must be in memory for something.
-    fn whole(&self, field: &str) -> Result<&Arc<sheetsplat::Volume>, Raised> {
+    pub(crate) fn whole(&self, field: &str) -> Result<&Arc<sheetsplat::Volume>, Raised> {
         match &self.0 {
             OpenVolume::Whole(volume) => Ok(volume),
             OpenVolume::Streamed(_) => Err(streamed(field)),
@@ -131,7 +131,7 @@ impl Volume {
         }
         let channels = channels.iter().map(array::values).collect::<Result<Vec<_>, _>>()?;
         let labels = labels.map(|labels| read_labels(labels, &bytes, limit)).transpose()?;
-        if let (Some((of_labels, _)), Some((sizes, _))) = (&labels, channels.first()) {
+        if let (Some((of_labels, ..)), Some((sizes, _))) = (&labels, channels.first()) {
             check_labels(*of_labels, *sizes)?;
         }
         let orientation =
@@ -153,8 +153,9 @@ impl Volume {
 
     /// A volume file, a folder of slices, or `builtin:NAME`: the channel, the time and the level that `selection` states. The scene in which it will be shown
     /// chooses a level that is left open, or the finest is taken. The spacing, in the order z, y, x, and the labels of an array go before the file's.
+    /// `content` is the file itself, of which `path` is then only the name.
     #[staticmethod]
-    #[pyo3(signature = (path, memory, selection, scene, bytes_read, changes=None, index=None, series=None))]
+    #[pyo3(signature = (path, memory, selection, scene, bytes_read, changes=None, index=None, series=None, content=None))]
     #[expect(clippy::too_many_arguments, reason = "the package's Python part passes its own")]
     fn open(
         py: Python<'_>,
@@ -166,12 +167,14 @@ impl Volume {
         changes: Option<Changes<'_>>,
         index: Option<PathBuf>,
         series: Option<String>,
+        content: Option<Vec<u8>>,
     ) -> PyResult<Self> {
         let inputs = Inputs::default();
         let mut options = reading(memory, index, bytes_read)?.noted_in(&inputs);
+        options.files = content.map(|content| [(path.clone(), content)].into_iter().collect());
         let (spacing, labels) = changes.unwrap_or_default();
         let labels = labels.map(|labels| read_labels(&labels, &[], options.memory_limit())).transpose()?;
-        if let Some((_, labels)) = &labels {
+        if let Some((_, labels, _)) = &labels {
             options.memory = Some(options.memory_limit().saturating_sub(size_of_val(&**labels) as u64));
         }
         let builtin = path.to_str().and_then(|path| path.strip_prefix(BUILTIN)).map(str::to_owned);
@@ -243,6 +246,12 @@ impl Volume {
     #[getter]
     fn channels(&self) -> usize {
         self.0.sample().channel_count()
+    }
+
+    /// Whether each voxel has a label beside its value.
+    #[getter]
+    fn labelled(&self) -> bool {
+        self.0.sample().labels().is_some()
     }
 
     #[getter]
@@ -319,18 +328,18 @@ impl Volume {
 }
 
 /// A vector from numbers in the order z, y, x.
-fn zyx([z, y, x]: [f64; 3]) -> DVec3 {
+pub(crate) fn zyx([z, y, x]: [f64; 3]) -> DVec3 {
     DVec3::new(x, y, z)
 }
 
-/// The sizes along x, y and z, and the labels of an array.
-type LabelArray = ([u32; 3], Arc<[u16]>);
+/// The sizes along x, y and z, the labels of an array, and the numbers that they stand for if these are others.
+type LabelArray = ([u32; 3], Arc<[u16]>, Option<Arc<[u64]>>);
 
 /// A spacing in the order z, y, x, and an array of labels, which go before a file's.
 type Changes<'py> = (Option<[f64; 3]>, Option<Bound<'py, PyAny>>);
 
 /// Checks a spacing in the order z, y, x, which errors keep.
-fn check_spacing(spacing: [f64; 3]) -> Result<(), Raised> {
+pub(crate) fn check_spacing(spacing: [f64; 3]) -> Result<(), Raised> {
     let checked = sheetsplat::internals::check_spacing("spacing", spacing.into());
     checked.map_err(|wrong| error::volume(&wrong.key, &wrong.found.to_string(), &wrong.allowed.to_string()))
 }
@@ -362,9 +371,15 @@ pub(crate) fn symbol(name: &str) -> Option<String> {
 }
 
 /// The labels of an array, which may take a number of bytes together with the values of some channels, of which each value takes some bytes.
+/// Labels with numbers of their own are a pair of the array and these numbers, ascending from that of label 0, which is 0.
 fn read_labels(labels: &Bound<'_, PyAny>, channels: &[usize], limit: u64) -> Result<LabelArray, Raised> {
-    array::sizes(labels)?.check(channels, true, limit)?;
-    array::labels(labels)
+    let (array, ids) = match labels.extract::<(Bound<'_, PyAny>, Vec<u64>)>() {
+        Ok((array, ids)) => (array, Some(ids.into())),
+        Err(_) => (labels.clone(), None),
+    };
+    array::sizes(&array)?.check(channels, true, limit)?;
+    let (dims, labels) = array::labels(&array)?;
+    Ok((dims, labels, ids))
 }
 
 /// An open volume with another spacing, in the order z, y, x, or other labels.
@@ -388,17 +403,20 @@ fn changed(
         check_spacing(spacing)?;
         volume = volume.with_spacing(ORIGIN, zyx(spacing))?;
     }
-    if let Some((dims, values)) = labels {
+    if let Some((dims, values, ids)) = labels {
         check_labels(dims, volume.dims().to_array())?;
         let names = volume.label_names().clone();
         let labels = Labels { origin: "labels".to_owned(), dims: dims.into(), spacing: None, values, names };
         volume = volume.with_labels(labels)?;
+        if let Some(ids) = ids {
+            volume = volume.with_label_ids(ids);
+        }
     }
     Ok(volume)
 }
 
 /// The minimum, maximum and mean of the values that are not NaN.
-fn extent_and_mean(values: ValueSlice<'_>) -> [f64; 3] {
+pub(crate) fn extent_and_mean(values: ValueSlice<'_>) -> [f64; 3] {
     let start = [f64::INFINITY, f64::NEG_INFINITY, 0.0, 0.0];
     let finite = values.iter().filter(|value| !value.is_nan()).map(f64::from);
     let [min, max, sum, count] =

@@ -1,6 +1,7 @@
 """Volumes from arrays of every library: what they may take, and what is no volume."""
 
 import pathlib
+import pickle
 import subprocess
 import sys
 from typing import Any
@@ -156,13 +157,38 @@ def test_negative_labels_are_refused(dtype: str) -> None:
 
 def test_labels_are_whole_numbers() -> None:
     values, labels = voxels()[:2, :3, :4], np.zeros((2, 3, 4))
-    for number in (0.5, 65536, np.nan, np.inf, -0.25):
+    for number in (0.5, 70000.5, np.nan, np.inf, -0.25):
         labels[0, 2, 3] = number
         refused("labels[0, 2, 3]", values, labels=labels)
     labels[0, 2, 3] = 65535
     assert Volume(values, labels=labels).info()["labels"]
     with pytest.raises(VolumeError, match="labels: found 2 dimensions"):
         Volume(values, labels=labels[0])
+
+
+@pytest.mark.parametrize("dtype", ["i4", "u4", "i8", "u8", "f8"])
+def test_labels_beyond_16_bits_are_exact(dtype: str) -> None:
+    """As in files: tables, names and pickles speak the array's own numbers."""
+    values = voxels()
+    labels = np.zeros(values.shape, dtype)
+    labels[2:] = 100_000
+    labels[4:] = 2_000_000_011 if dtype != "u8" else 2**63 + 1025
+    for volume in (Volume(values, labels=labels), Volume(Volume(values), labels=labels)):
+        again = pickle.loads(pickle.dumps(volume))
+        for shown in (volume, again):
+            ids = sheetsplat._native.label_array(shown._native)
+            assert ids is not None and (ids == labels.astype(ids.dtype)).all()
+        table = [{"label": 0, "visible": False}, {"label": 100_000, "color": [[0, [1, 0, 0]]], "opacity": [[0, 0.9]]}]
+        small = {"image": {"width": 24, "height": 24}}
+        red = sheetsplat.render(volume, transfer={"label": table}, **small)
+        direct = sheetsplat.render(values, labels=np.unique(labels, return_inverse=True)[1].reshape(labels.shape), transfer={"label": [table[0], {**table[1], "label": 1}]}, **small)
+        assert red == direct and np.asarray(red)[..., 0].max() > 0.1
+    labels[0, 0, 0] = 3
+    negative = labels.astype("f8")
+    negative[0, 0, 1] = -1
+    refused("labels[0, 0, 1]", values, labels=negative)
+    many = np.arange(70_000).reshape(70, 100, 10)
+    assert "70000 different labels" in str(refused("labels", many.astype("f4"), labels=many))
 
 
 def test_what_float32_does_not_hold() -> None:

@@ -3,6 +3,7 @@
 import importlib
 import inspect
 import re
+import types
 from collections.abc import Iterator
 from typing import Any
 
@@ -63,7 +64,9 @@ def documented(text: str) -> list[str]:
 
 def expected(function: Any) -> list[str]:
     prefixes = {inspect.Parameter.VAR_KEYWORD: "**", inspect.Parameter.VAR_POSITIONAL: "*"}
-    parameters = inspect.signature(function).parameters.values()
+    # A signature that names the words for completion has them as one parameter in its source.
+    plain = types.FunctionType(function.__code__, function.__globals__, closure=function.__closure__)
+    parameters = inspect.signature(plain).parameters.values()
     return [prefixes.get(one.kind, "") + one.name for one in parameters if one.name not in ("self", "cls")]
 
 

@@ -23,6 +23,11 @@ def no_blessing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("SHEETSPLAT_BLESS", raising=False)
 
 
+def text_has_controls(text: str) -> bool:
+    """Whether a page has a zoom, and a slider between the golden and what was found."""
+    return all(part in text for part in ('<select><option value="1">', '<input type="range"', '<div class="both"><img class="golden"'))
+
+
 def run(pytester: pytest.Pytester, change: str = "", grey: int = 100) -> pytest.RunResult:
     pytester.makepyfile(test_it=TEST % (change, grey))
     return pytester.runpytest_subprocess("-p", "no:cacheprovider")
@@ -45,6 +50,7 @@ def test_goldens(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> 
     result.assert_outcomes(passed=1, failed=1)
     result.stdout.fnmatch_lines(["*of 24×24 pixels*differ by more than 0 of 255*", "golden images that failed: *index.html"])
     left = sorted(path.name for path in (pytester.path / "golden-failures" / "test_it").iterdir())
+    assert text_has_controls(page.read_text())
     assert left == ["head-actual.png", "head-difference.png", "head-golden.png", "head-report.txt"]
     text = page.read_text()
     for name in left[:3]:
@@ -54,6 +60,47 @@ def test_goldens(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> 
     assert page.read_text() == text
     run(pytester).assert_outcomes(passed=2)
     assert not page.exists() and not (page.parent / "test_it" / "head-actual.png").exists()
+
+
+def test_a_failure_names_the_line(pytester: pytest.Pytester) -> None:
+    pytester.makeconftest("""
+def check(golden, picture):
+    golden(picture, "helped")
+""")
+    pytester.makepyfile(test_it=TEST % ("", 100) + """
+def test_by_a_helper(golden):
+    from conftest import check
+    picture = np.zeros((2, 2, 3))
+    check(golden, picture)
+""")
+    result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
+    result.stdout.fnmatch_lines(["test_it.py:5: *head.png does not exist*", "test_it.py:8: *grey*", "test_it.py:13: *helped*"])
+    text = (pytester.path / "golden-failures" / "index.html").read_text()
+    assert all(f"<p>test_it.py:{line}</p>" in text for line in (5, 8, 13))
+
+
+def test_options(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytester.makepyfile(test_it=TEST % ("", 100))
+    options = ("-p", "no:cacheprovider", "--golden-report", "out/all.html")
+    result = pytester.runpytest_subprocess(*options, "--golden-bless", "-k", "array")
+    result.assert_outcomes(passed=1, deselected=1)
+    result.stdout.fnmatch_lines(["golden images that were compared: *all.html"])
+    assert (pytester.path / "goldens" / "grey.png").exists() and not (pytester.path / "goldens" / "head.png").exists()
+    pytester.runpytest_subprocess(*options, "--golden-bless").assert_outcomes(passed=2)
+    page = pytester.path / "out" / "all.html"
+    text = page.read_text()
+    assert "0 of 2 golden images failed" in text and "head blessed" in text and "grey passed" in text
+    pytester.makepyfile(test_it=TEST % ("", 103))
+    pytester.runpytest_subprocess(*options).assert_outcomes(passed=1, failed=1)
+    # One file, with the pictures inside: the golden twice and what was found twice, to be laid over one another, and the difference.
+    text = page.read_text()
+    assert text.count('src="data:image/png;base64,') == text.count("<img ") == 6
+    assert "1 of 2 golden images failed" in text and "grey failed" in text and "test_it.py:8" in text
+    assert text.index("grey failed") < text.index("head passed")
+    monkeypatch.setenv("SHEETSPLAT_BLESS", "head")
+    result = pytester.runpytest_subprocess(*options, "--golden-bless")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*--golden-bless: found SHEETSPLAT_BLESS=head beside it*"])
 
 
 def test_lax_settings_are_refused(golden, tmp_path: pathlib.Path) -> None:  # type: ignore[no-untyped-def]

@@ -61,9 +61,9 @@ def test_simpleitk(tmp_path: pathlib.Path, extension: str) -> None:
     same(SimpleITK.ReadImage(str(path)), path)
 
 
-def test_vectors_and_planes_are_refused() -> None:
-    for image in (SimpleITK.Image(4, 5, SimpleITK.sitkUInt8), SimpleITK.Image([4, 5, 6], SimpleITK.sitkVectorUInt8, 3)):
-        with pytest.raises(sheetsplat.VolumeError, match="array: "):
+def test_planes_are_refused() -> None:
+    for image in (SimpleITK.Image(4, 5, SimpleITK.sitkUInt8), SimpleITK.Image([4, 5], SimpleITK.sitkVectorUInt8, 3)):
+        with pytest.raises(sheetsplat.VolumeError, match="array: spacing: found .* of three dimensions"):
             sheetsplat.Volume(image)
 
 

@@ -157,7 +157,7 @@ def test_orbits(tmp_path: pathlib.Path) -> None:
         saved = np.load(tmp_path / f"f-{frame:02}.npy")
         np.testing.assert_array_equal(saved, np.asarray(pictures[frame]))
         np.testing.assert_array_equal(saved, np.load(tmp_path / f"g{frame}.npy"))
-    for output in ("a.png", "a%s.png", "a#b#.png", "a%d%d.png", "a%d.jpg"):
+    for output in ("a.png", "a%s.png", "a#b#.png", "a%d%d.png", "a%d.bmp"):
         with pytest.raises(sheetsplat.ImageError, match="found"):
             sheetsplat.orbit(HEAD, tmp_path / output, count=3, image=SMALL)
     with pytest.raises(sheetsplat.SceneError, match="frames: found range"):

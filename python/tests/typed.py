@@ -22,7 +22,13 @@ def use(values: NDArray[np.int16]) -> None:
     assert_type(view.orbit(count=3), Iterator[Image])
     assert_type(sheetsplat.render(values).to_uint8(), NDArray[np.uint8])
     assert_type(sheetsplat.compare(values, values), Comparison)
-    assert_type(sheetsplat.orbit(values, "turn.gif"), Iterator[Image] | None)
+    assert_type(sheetsplat.orbit(values), Iterator[Image])
+    sheetsplat.orbit(values, "turn.gif", fps=10, cmap="hot")
+    settings: dict[str, Any] = {"camera.up": [0, 0, 1]}
+    Scene(preset="mip", size=(8, 8), view="iso", camera={"fov_y": 30, "projection": "perspective"}, **settings)
+    small = {"width": 8, "height": 8}
+    sheetsplat.render(values, image=small, clim=(0, 1), opacity=[0, 0.5], backend="cpu", background=[0, 0, 0, 1])
+    view.set(zoom=2, azimuth=30, clim=None)
     assert_type(sheetsplat.info("head.nrrd", spacing=2), dict[str, Any])
     assert_type(volume.unit, str | None)
     issubclass(sheetsplat.SheetsplatWarning, UserWarning)
@@ -35,6 +41,12 @@ def use(values: NDArray[np.int16]) -> None:
     # Each of these is an error, which `--strict` reports if it is none.
     View(volume, backend=5)  # type: ignore[arg-type]
     view.render().save("a.png", depth="8")  # type: ignore[arg-type]
+    Scene(previw="mip")  # type: ignore[call-arg]
+    Scene(preset="ct-bones")  # type: ignore[arg-type]
+    view.render(view="font")  # type: ignore[arg-type]
+    sheetsplat.render(values, opacity="sigmod")  # type: ignore[arg-type]
+    sheetsplat.orbit(values, clim=3)  # type: ignore[call-overload]
+    number: int = sheetsplat.orbit(values, "turn.gif")  # type: ignore[assignment]
     view.camera = scene  # type: ignore[attr-defined]
     Volume()  # type: ignore[call-arg]
     sheetsplat.rendre(values)  # type: ignore[attr-defined]

@@ -90,6 +90,11 @@ impl Colormap {
         })
     }
 
+    /// The map's colours, evenly spaced from the least to the greatest value, each component in [0, 1]; `None` for the file's palette.
+    pub fn rgb(self) -> Option<Vec<DVec3>> {
+        self.colors().map(|colors| colors.iter().copied().map(rgb).collect())
+    }
+
     /// The map for a volume, over the values that it shows ([`shown_range`]), or the palette of its file; `None` if that has no palette.
     pub fn of(self, volume: &Volume, transfer: &TransferFunction) -> Option<Ramp<DVec3>> {
         match self.colors() {
@@ -99,12 +104,16 @@ impl Colormap {
     }
 }
 
+/// A colour `0xrrggbb`.
+fn rgb(color: u32) -> DVec3 {
+    DVec3::from([16, 8, 0].map(|shift| f64::from(color >> shift & 0xff) / 255.0))
+}
+
 /// Evenly spaced colours over values from `lo` to `hi`; the last colour if these are equal.
 fn over(colors: &[u32], [lo, hi]: [f64; 2]) -> Ramp<DVec3> {
     let last = (colors.len() - 1) as f64;
     // Halves are used because the range may exceed the largest f64.
     let place = |at: usize| 2.0 * (lo / 2.0 + (hi / 2.0 - lo / 2.0) * (at as f64 / last));
-    let rgb = |color: u32| DVec3::from([16, 8, 0].map(|shift| f64::from(color >> shift & 0xff) / 255.0));
     let mut points: Vec<_> = colors.iter().enumerate().map(|(at, &color)| (place(at), rgb(color))).collect();
     // Values are f32, so only equal ends coincide.
     points.dedup_by(|later, earlier| {

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2};
 
-use crate::error::setting::scaled;
+use crate::error::setting::{SettingError, scaled};
 use crate::settings::camera::{Camera, Projection};
 use crate::volume::Grid;
 
@@ -21,6 +21,24 @@ pub fn orbit(camera: &mut Camera, degrees: DVec2) {
     let elevation = (elevation(camera) + degrees.y).clamp(-MAX_ELEVATION, MAX_ELEVATION);
     let (sine, cosine) = libm::sincos(elevation.to_radians());
     *camera = camera.looking([azimuth * horizontal * cosine - up * sine, camera.up]);
+}
+
+/// The camera whose eye has gone to the right about `up` by `azimuth` degrees, and then up by `elevation` degrees. `up` and the centre do not change.
+///
+/// # Errors
+/// If the eye would stand more than [`MAX_ELEVATION`] degrees above or below the plane perpendicular to `up`.
+pub fn eye_moved(camera: &Camera, azimuth: f64, elevation: f64) -> Result<Camera, SettingError> {
+    if azimuth == 0.0 && elevation == 0.0 {
+        return Ok(*camera);
+    }
+    let mut moved = camera.turned(azimuth);
+    let above = self::elevation(&moved) + elevation;
+    if above.abs() > MAX_ELEVATION {
+        let found = format!("{elevation}, which puts the eye {above:.1} degrees above the level");
+        return Err(SettingError::new("elevation", found, format!("at most {MAX_ELEVATION} above or below it")));
+    }
+    orbit(&mut moved, DVec2::new(0.0, elevation));
+    Ok(moved)
 }
 
 /// The degrees of the eye over the plane through the camera's centre that is perpendicular to `up`.
@@ -64,6 +82,7 @@ pub fn pan(camera: &mut Camera, moved: DVec2) {
 }
 
 #[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
 mod tests {
     use glam::{DVec3, UVec3};
 
@@ -100,6 +119,19 @@ mod tests {
         assert!(camera.direction.abs_diff_eq(-DVec3::X, 1e-12), "{}", camera.direction);
         orbit(&mut camera, DVec2::new(-270.0, 0.0));
         assert!(camera.direction.abs_diff_eq(DVec3::Y, 1e-12), "{}", camera.direction);
+    }
+
+    #[test]
+    fn an_eye_goes_to_the_right_and_up_or_is_refused() {
+        let camera = Camera::default();
+        assert_eq!(eye_moved(&camera, 0.0, 0.0).unwrap(), camera);
+        let moved = eye_moved(&camera, 90.0, 30.0).unwrap();
+        assert!(moved.direction.abs_diff_eq(DVec3::new(-0.75_f64.sqrt(), 0.0, -0.5), 1e-12), "{}", moved.direction);
+        let again = eye_moved(&moved, 0.0, 60.0).unwrap_err().to_string();
+        assert_eq!(
+            again,
+            "elevation: found 60, which puts the eye 90.0 degrees above the level, allowed: at most 89 above or below it"
+        );
     }
 
     #[test]

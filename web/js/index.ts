@@ -26,6 +26,10 @@ export interface Options {
     fit?: boolean;
     /** The folder of the WebAssembly files, if they do not lie beside this script. */
     base?: URL | string;
+    /** The worker, if the page cannot load `worker.js` by its address, such as one that is a single file. It draws on the CPU, by `module` and without helpers. */
+    worker?: Worker;
+    /** The compiled library for the CPU, if the page cannot load its file by an address. */
+    module?: WebAssembly.Module;
 }
 
 /** How files are loaded. */
@@ -86,16 +90,17 @@ export class SheetSplat extends EventTarget {
         if (!["auto", "cpu", "gpu"].includes(backend)) {
             throw new RangeError(`backend: found "${backend}", allowed: "auto", "cpu", "gpu"`);
         }
-        const workers = options.workers ?? Math.min(navigator.hardwareConcurrency || 1, 8);
+        const workers = options.workers ?? (options.worker ? 1 : Math.min(navigator.hardwareConcurrency || 1, 8));
         if (!Number.isInteger(workers) || workers < 1 || workers > 64) {
             throw new RangeError(`workers: found ${workers}, allowed: 1 to 64`);
         }
         const size = fit ? onScreen(canvas) : [canvas.width, canvas.height] as [number, number];
-        const remote = new Remote(new Worker(new URL("./worker.js", import.meta.url), { type: "module" }));
+        const remote = new Remote(options.worker ?? new Worker(new URL("./worker.js", import.meta.url), { type: "module" }));
         try {
             const offscreen = canvas.transferControlToOffscreen();
             const base = options.base === undefined ? undefined : new URL(options.base, document.baseURI).href;
-            const start = { canvas: offscreen, backend, workers, allAround: controls, size, base };
+            const code = options.module && { module: options.module };
+            const start = { canvas: offscreen, backend, workers, allAround: controls, size, base, ...code };
             const chosen = await remote.call("start", [start], [offscreen]);
             return new SheetSplat(canvas, remote, chosen, controls, fit);
         } catch (error) {

@@ -210,6 +210,12 @@ impl Volume {
         Ok(self)
     }
 
+    /// The same volume with the numbers that its labels stand for, ascending from that of label 0, which is 0 ([`Self::label_ids`]).
+    #[doc(hidden)]
+    pub fn with_label_ids(self, ids: Arc<[u64]>) -> Self {
+        Self { label_ids: Some(ids), ..self }
+    }
+
     /// All labels, x fastest, then y, then z; `None` if the volume is not segmented.
     pub fn labels(&self) -> Option<&[u16]> {
         self.labels.as_deref()

@@ -6,7 +6,6 @@ use std::time::Instant;
 
 use clap::ValueEnum;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use glam::DVec2;
 use sheetsplat::RenderError;
 use sheetsplat::appearance::{Colormap, Preset};
 use sheetsplat::headless::{Backend, Error, Headless, HeadlessOptions};
@@ -376,19 +375,10 @@ impl Input {
         }
         self.look_at_side(volume, scene)?;
         let [azimuth, elevation] = [self.azimuth, self.elevation].map(Option::unwrap_or_default);
-        if azimuth == 0.0 && elevation == 0.0 {
-            return Ok(());
+        if azimuth != 0.0 || elevation != 0.0 {
+            let moved = navigation::eye_moved(&scene.camera_for(volume), azimuth, elevation);
+            scene.camera = moved.map_err(|error| Failure::Input(format!("--{error}")))?;
         }
-        let mut camera = scene.camera_for(volume).turned(azimuth);
-        let above = navigation::elevation(&camera) + elevation;
-        if above.abs() > navigation::MAX_ELEVATION {
-            let most = navigation::MAX_ELEVATION;
-            let found =
-                format!("--elevation: found {elevation}, which puts the eye {above:.1} degrees above the level");
-            return Err(Failure::Input(format!("{found}, allowed: at most {most} above or below it")));
-        }
-        navigation::orbit(&mut camera, DVec2::new(0.0, elevation));
-        scene.camera = camera;
         Ok(())
     }
 
