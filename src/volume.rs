@@ -2,10 +2,10 @@
 
 #[doc(inline)]
 pub use sheetsplat_volume::{
-    BytesRead, ChannelDisplay, Channels, ChunkProgress, Encoding, Files, Grid, IndexedStore, Inputs, Labels, Members,
-    Orientation, Outputs, PatientSide, RawLayout, ReadOptions, SampleType, Store, StoreFacts, StoreIndex, StoreLevel,
-    StreamedChannel, StreamedLevel, StreamedVolume, Texel, ValueIter, ValueSlice, Values, Volume, VolumeError, builtin,
-    open_raw_store, open_store, sample,
+    BytesRead, ChannelDisplay, Channels, ChunkProgress, Encoding, Files, Grid, IndexedStore, Inputs, LabelTable,
+    Labels, Members, Orientation, Outputs, PatientSide, RawLayout, ReadOptions, SampleType, Store, StoreFacts,
+    StoreIndex, StoreLevel, StreamedChannel, StreamedLevel, StreamedVolume, Texel, ValueIter, ValueSlice, Values,
+    Volume, VolumeError, builtin, open_raw_store, open_store, sample,
 };
 
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]

@@ -22,6 +22,9 @@ pub struct Channel {
     pub spacing: Option<DVec3>,
     /// A file with one label per voxel, in place of the volume's own labels.
     pub labels: Option<PathBuf>,
+    /// A table of the labels' names and colours ([`LabelTable`](crate::volume::LabelTable)), which precede those of files: a file, or
+    /// `builtin:freesurfer`.
+    pub label_table: Option<PathBuf>,
     /// The number, from 0, of the only channel that is read of a file with several; `None` reads all of a scene's only file.
     pub index: Option<u32>,
     /// The number, from 0, of the time that is read of a file with several; `None` reads the first.
@@ -44,6 +47,7 @@ impl Channel {
             volume,
             spacing: None,
             labels: None,
+            label_table: None,
             index: None,
             time: None,
             level: None,

@@ -8,8 +8,8 @@ use glam::DVec3;
 use super::{Channel, Scene, VolumeSource};
 use crate::appearance::{Preset, categories};
 use crate::volume::{
-    self, Access, AdaptedStore, Channels, Resampling, Selection, Store, StreamedChannel, StreamedLevel, Volume,
-    VolumeError, builtin, raw_store,
+    self, Access, AdaptedStore, Channels, LabelTable, Resampling, Selection, Store, StreamedChannel, StreamedLevel,
+    Volume, VolumeError, builtin, raw_store,
 };
 
 /// The scene's volume with all channels, on the first one's grid.
@@ -46,7 +46,7 @@ pub(super) fn has_labels_for_values(settings: &Channel, volume: &Volume) -> bool
 
 /// The scene's volume to be read by boxes; `None` if it has several channels or labels, or is no file.
 pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Store>, VolumeError>> {
-    let [first @ Channel { labels: None, .. }] = &*scene.channels else { return None };
+    let [first @ Channel { labels: None, label_table: None, .. }] = &*scene.channels else { return None };
     let access = access
         .selecting(Selection { channel: first.index, time: first.time, level: None })
         .of_series(first.series.as_deref());
@@ -58,12 +58,15 @@ pub(super) fn store(scene: &Scene, access: &Access) -> Option<Result<Arc<dyn Sto
     Some(store.and_then(|store| spaced(&origin(&first.volume), store, first.spacing)))
 }
 
-/// The channels that a scene names, or all of the only file that it names, to be read by boxes; `None` if one of them comes from no file.
+/// The channels that a scene names, or all of the only file that it names, to be read by boxes; `None` if one of them comes from no file, or has a
+/// table of labels.
 ///
 /// # Errors
 /// If a file cannot be read by boxes, lacks what is selected, or holds several channels where several channels name volumes.
 pub(super) fn streamed(scene: &Scene, access: &Access) -> Option<Result<Channels<StreamedChannel>, VolumeError>> {
-    let is_file = |channel: &Channel| matches!(channel.volume, VolumeSource::File(_) | VolumeSource::Raw(..));
+    let is_file = |channel: &Channel| {
+        matches!(channel.volume, VolumeSource::File(_) | VolumeSource::Raw(..)) && channel.label_table.is_none()
+    };
     let (first, others) = named(scene).split_first()?;
     named(scene).iter().all(is_file).then(|| {
         let mut channels = streamed_file(first, access)?;
@@ -163,6 +166,10 @@ fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, Vol
             let access = access.whole_at(volume.level());
             volume.with_labels_of(path, settings.spacing.is_some(), &access)?
         }
+        None => volume,
+    };
+    let volume = match &settings.label_table {
+        Some(path) => volume.with_label_table(&LabelTable::read(path, access)?)?,
         None => volume,
     };
     match settings.spacing {

@@ -85,21 +85,35 @@ pub(super) fn channels(
     for ChannelTables { key, name, visible, volume: of_volume, transfer: of_transfer, .. } in tables {
         let origins = of_volume.origins;
         let is_first = channels.is_empty();
-        let VolumeSettings { source, spacing, labels, index, time, level, series } =
+        let VolumeSettings { source, spacing, labels, label_table, index, time, level, series } =
             volume(of_volume, folder, if is_first { given.take() } else { Some(VolumeSource::Memory) })?;
         let states_more = spacing.is_some()
             || labels.is_some()
+            || label_table.is_some()
             || index.is_some()
             || time.is_some()
             || level.is_some()
             || series.is_some();
-        if !is_first && source == VolumeSource::Memory && states_more {
+        let is_nameless = source == VolumeSource::Memory;
+        if is_nameless && (!is_first && states_more || label_table.is_some()) {
             let found = "keys of a volume without path or builtin";
             let allowed = "keys of a volume of the channel's own";
             return Err(origins.invalid(&format!("{key}.volume"), &[], found, allowed));
         }
         let transfer = TransferSettings { preset, ..transfer(of_transfer)? };
-        let channel = Channel { name, visible, volume: source, spacing, labels, index, time, level, series, transfer };
+        let channel = Channel {
+            name,
+            visible,
+            volume: source,
+            spacing,
+            labels,
+            label_table,
+            index,
+            time,
+            level,
+            series,
+            transfer,
+        };
         if !channel.transfer.labels.is_empty() && !channel.may_have_labels() {
             let key = |name: &str| if key.is_empty() { name.to_owned() } else { format!("{key}.{name}") };
             let allowed = "no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
@@ -122,6 +136,7 @@ struct VolumeSettings {
     source: VolumeSource,
     spacing: Option<DVec3>,
     labels: Option<PathBuf>,
+    label_table: Option<PathBuf>,
     index: Option<u32>,
     time: Option<u32>,
     level: Option<u32>,
@@ -130,12 +145,16 @@ struct VolumeSettings {
 
 /// Reads `[volume]`; `given` is the source of a table that names none.
 fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> Result<VolumeSettings, SceneError> {
-    let (mut path, mut builtin, mut spacing, mut labels) = (None, None, None, None);
+    let (mut path, mut builtin, mut spacing, mut labels, mut label_table) = (None, None, None, None, None);
     section.read("path", &mut path, |entry| entry.text("a volume file's path").map(Some))?;
     section.read("builtin", &mut builtin, |entry| entry.text("a builtin volume's name").map(Some))?;
     section.read("spacing", &mut spacing, |entry| entry.numbers(SPACING).map(|s| Some(DVec3::from_array(s))))?;
     section.read("labels", &mut labels, |entry| {
         entry.text("a label file's path").map(|path| Some(written_in(folder, &path)))
+    })?;
+    section.read("label_table", &mut label_table, |entry| {
+        let text = entry.text("a table's path, or builtin:freesurfer")?;
+        Ok(Some(if text.starts_with("builtin:") { text.into() } else { written_in(folder, &text) }))
     })?;
     let (mut index, mut time, mut level) = (None, None, None);
     section.read("index", &mut index, |entry| entry.count().map(Some))?;
@@ -164,7 +183,7 @@ fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> R
             return Err(origins.invalid(&format!("{key}.dims"), &[], found, format!("{key}.path")));
         }
     };
-    Ok(VolumeSettings { source, spacing, labels, index, time, level, series })
+    Ok(VolumeSettings { source, spacing, labels, label_table, index, time, level, series })
 }
 
 /// The layout of a raw file: `dims`, which requires `type`, `endian` and `offset`.

@@ -71,7 +71,7 @@ struct Text {
 }
 
 fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<(), SceneError> {
-    let Channel { name, visible, volume, spacing, labels, index, time, level, series, transfer } = channel;
+    let Channel { name, visible, volume, spacing, labels, label_table, index, time, level, series, transfer } = channel;
     if text.channel.is_some() {
         let _ = writeln!(text.text, "\n[[channel]]");
         text.given("name", name.as_deref());
@@ -106,6 +106,11 @@ fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<()
     text.given("spacing", spacing.map(vector));
     let labels = labels.as_ref().map(|path| within(folder, path, &of_labels));
     text.given("labels", labels.transpose()?);
+    let table = label_table.as_ref().map(|path| match path.to_str() {
+        Some(name) if name.starts_with("builtin:") => Ok(name.to_owned()),
+        _ => within(folder, path, &key("label_table")),
+    });
+    text.given("label_table", table.transpose()?);
     text.given("index", index.map(i64::from));
     text.given("time", time.map(i64::from));
     text.given("level", level.map(i64::from));

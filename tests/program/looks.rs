@@ -138,6 +138,28 @@ fn one_label_is_drawn_alone() {
     assert!(!folder.path("none.npy").exists());
 }
 
+/// A table beside a scene names labels and gives them colours, here and in the saved scene.
+#[test]
+fn labels_have_a_tables_names_and_colours() {
+    let folder = Folder::new();
+    folder.write("names.txt", "# number, name, colour\n2 bone 255 0 0 0\n");
+    let head = "builtin:head:32 --set preset=labels --size 40 --backend cpu --set volume.label_table";
+    folder.render(&format!("{head}=names.txt --only bone -o bone.npy --save-scene bone.toml"));
+    folder.render("bone.toml --backend cpu -o saved.npy");
+    assert_eq!(folder.read("bone.npy"), folder.read("saved.npy"));
+    let (_, _, pixels) = folder.pixels("bone.toml");
+    assert!(pixels.iter().any(|[r, ..]| *r > 0.1) && pixels.iter().all(|[_, g, b, _]| g == b));
+    folder.render(&format!("{head}=builtin:freesurfer --only Left-Cerebral-White-Matter -o white.npy"));
+    folder.write("wrong.txt", "2 bone 255 0\n");
+    for (table, found) in
+        [("wrong.txt", "wrong.txt: line 1: found 2 bone 255 0, allowed: "), ("builtin:allen", "label table: found ")]
+    {
+        let run = folder.run(&format!("render {head}={table} -o none.npy"));
+        assert!(run.code == Some(2) && run.stderr.contains(found), "{}", run.stderr);
+        assert!(!folder.path("none.npy").exists());
+    }
+}
+
 #[test]
 fn a_scene_files_colours_give_way_to_a_colour_map_alone() {
     let folder = Folder::new();

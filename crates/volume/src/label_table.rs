@@ -26,7 +26,7 @@ pub struct LabelTable {
 impl LabelTable {
     /// FreeSurfer's own labels, those of `aseg`, `aparc+aseg` and `wmparc` volumes, with their usual colours.
     pub fn freesurfer() -> Self {
-        let origin = "freesurfer";
+        let origin = "builtin:freesurfer";
         let legend = parse(Path::new(origin), include_str!("freesurfer.txt")).unwrap_or_default();
         Self { origin: origin.to_owned(), legend }
     }
@@ -36,12 +36,19 @@ impl LabelTable {
     /// # Errors
     /// If the file cannot be read, has more than 16 MiB, or a line is none of a table. The error names the file and the line.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, VolumeError> {
-        Self::open_by(path, &Access::new(options)?)
+        Self::read(path, &Access::new(options)?)
     }
 
-    /// [`Self::open`] with what a scene may read.
+    /// [`Self::open`] with what a scene may read, or [`Self::freesurfer`] by its name `builtin:freesurfer`.
     #[doc(hidden)]
-    pub fn open_by(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+    pub fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
+        match path.to_str().and_then(|path| path.strip_prefix("builtin:")) {
+            Some("freesurfer") => return Ok(Self::freesurfer()),
+            Some(_) => {
+                return Err(invalid(path, "label table", "another name", "builtin:freesurfer, or a file's path"));
+            }
+            None => {}
+        }
         let (mut source, mut budget, mut text) = (access.open(path)?, MOST_BYTES, String::new());
         while let Some(line) = source.line(&mut budget)? {
             text.push_str(&line);
@@ -167,7 +174,7 @@ mod tests {
         let volume = Volume::from_values("a", UVec3::new(2, 1, 1), DVec3::ONE, vec![0.0_f32, 0.5]).unwrap();
         let message = volume.with_label_table(&LabelTable::freesurfer()).unwrap_err().to_string();
         assert!(
-            message.starts_with("freesurfer: label table: found a volume with the value 0.5, allowed: labels"),
+            message.starts_with("builtin:freesurfer: label table: found a volume with the value 0.5, allowed: labels"),
             "{message}"
         );
     }
