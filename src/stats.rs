@@ -92,7 +92,7 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Adds those of a further channel that was drawn by itself (SPEC §10).
+    /// Adds those of another channel that was drawn by itself (SPEC §10).
     pub(crate) fn add_channel(&mut self, other: &Self) {
         let Self { voxels_total: _, voxels_in_range, voxels_shaded, sections_total, sections_rasterized, .. } = self;
         let Self { sheets, tiles_total, tiles_composited, quads, bricks_tested, bricks_visited, .. } = *other;

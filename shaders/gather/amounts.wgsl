@@ -57,15 +57,15 @@ fn shaded(voxel: vec3u, p: vec4f) -> Shaded {
     var alpha = first.alpha;
     for (var channel = 1u; channel < CHANNELS; channel += 1u) {
         read_channel(channel);
-        let further = shaded_further(voxel, channel, p);
-        channels = with_channel(channels, further.amount);
-        alpha += further.alpha;
+        let later = shaded_later(voxel, channel, p);
+        channels = with_channel(channels, later.amount);
+        alpha += later.alpha;
     }
     return Shaded(total(channels), alpha);
 }
 
 // In a channel after the first.
-fn shaded_further(voxel: vec3u, channel: u32, p: vec4f) -> Shaded {
+fn shaded_later(voxel: vec3u, channel: u32, p: vec4f) -> Shaded {
     let index = index_of(voxel);
     let ramps = ramps_of(channel, index);
     let stored = stored_at(index);

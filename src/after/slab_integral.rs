@@ -130,8 +130,8 @@ pub fn table(tables: &Tables, splatting: &Splatting, numbers: &Normalization) ->
 #[cfg(feature = "gpu")]
 pub(crate) fn search_steps(table: &[[f32; 4]]) -> u32 {
     let bins = table[HEAD..HEAD + table[0][1] as usize].iter();
-    let further = bins.map(|&[first, last, ..]| (last - first) as u32).max().unwrap_or(0);
-    further.checked_ilog2().map_or(0, |log| log + 1)
+    let most = bins.map(|&[first, last, ..]| (last - first) as u32).max().unwrap_or(0);
+    most.checked_ilog2().map_or(0, |log| log + 1)
 }
 
 /// The number of levels of the sparse table.

@@ -35,7 +35,7 @@ pub(super) type BrickMaterials = Box<[Material]>;
 pub(super) struct Materials {
     channels: usize,
     bricks: Vec<OnceLock<BrickMaterials>>,
-    /// The number of further bricks that may be kept.
+    /// The number of other bricks that may be kept.
     room: AtomicIsize,
 }
 

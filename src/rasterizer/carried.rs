@@ -24,19 +24,19 @@ pub(crate) struct Carried {
 }
 
 impl Carried {
-    /// Allocates buffers that no longer fit, with room for `further` records of a pixel that need not be cleared.
+    /// Allocates buffers that no longer fit, with room for `more` records of a pixel that need not be cleared.
     ///
     /// # Errors
     /// If they exceed the device's maximum size of buffers.
     pub(crate) fn prepare(
         FrameInputs { device, request, .. }: FrameInputs<'_>,
         numbers: Normalization,
-        further: u32,
+        more: u32,
         old: Option<Self>,
     ) -> Result<Self, RenderError> {
         let mut old = old.map(|old| old.bands).unwrap_or_default().into_iter();
         let bands =
-            Self::specs(request, further).map(|spec| grown(device, old.next(), &spec)).collect::<Result<_, _>>()?;
+            Self::specs(request, more).map(|spec| grown(device, old.next(), &spec)).collect::<Result<_, _>>()?;
         Ok(Self {
             bands,
             records: request.records(),
@@ -46,8 +46,8 @@ impl Carried {
     }
 
     /// The specs of the buffers.
-    pub(crate) fn specs(request: &FrameRequest, further: u32) -> impl Iterator<Item = BufferSpec> {
-        let (width, records) = (u64::from(request.view.size[0]), u64::from(request.records() + further));
+    pub(crate) fn specs(request: &FrameRequest, more: u32) -> impl Iterator<Item = BufferSpec> {
+        let (width, records) = (u64::from(request.view.size[0]), u64::from(request.records() + more));
         request.bands.iter().map(move |&Band { rows, .. }| {
             let usage = BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST;
             buffer_spec("sheetsplat.carried", width * u64::from(rows) * records * CARRIED_BYTES, usage)

@@ -227,7 +227,7 @@ mod tests {
                     _ => -2.0,
                 };
                 scene.camera = Camera { projection, direction, up, center: Some(DVec3::ZERO), ..Camera::default() };
-                let alpha = render(&volume, &transfer, &scene).unwrap().pixels[0][3];
+                let alpha = pixels(&volume, &transfer, &scene, &[UVec2::ZERO]).unwrap()[0][3];
                 let amount = -(1.0_f64 - 0.6).ln() * kernel.section(0.0, near, 2.0) * stretch;
                 assert!(
                     (f64::from(alpha) - (1.0 - (-amount).exp())).abs() < 1e-4,

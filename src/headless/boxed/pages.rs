@@ -215,8 +215,8 @@ impl<'a> Pages<'a> {
         if end <= slabs.start {
             return Ok(None);
         }
-        let further = blocks.iter().rev().map(|&(_, block)| block).filter(|block| !self.blocks.contains_key(block));
-        self.ahead = further.take(if hides { 0 } else { AHEAD * current_num_threads() }).collect();
+        let next = blocks.iter().rev().map(|&(_, block)| block).filter(|block| !self.blocks.contains_key(block));
+        self.ahead = next.take(if hides { 0 } else { AHEAD * current_num_threads() }).collect();
         // Slabs may count that show nothing.
         let within = needed.within().or(nearest.filter(|_| self.chunks.counts_all()));
         let pages = Needed::sorted(needed.pages);
