@@ -83,7 +83,7 @@ fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<()
         Some(number) => format!("channel[{number}].volume.{name}"),
         None => format!("volume.{name}"),
     };
-    let (of_path, of_labels, of_offset) = (key("path"), key("labels"), key("offset"));
+    let (of_path, of_labels, of_table, of_offset) = (key("path"), key("labels"), key("label_table"), key("offset"));
     // A later channel without a volume is one of the first one's.
     if *volume != VolumeSource::Memory || text.channel.is_none_or(|number| number == 0) {
         text.table("volume");
@@ -108,7 +108,7 @@ fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<()
     text.given("labels", labels.transpose()?);
     let table = label_table.as_ref().map(|path| match path.to_str() {
         Some(name) if name.starts_with("builtin:") => Ok(name.to_owned()),
-        _ => within(folder, path, &key("label_table")),
+        _ => within(folder, path, &of_table),
     });
     text.given("label_table", table.transpose()?);
     text.given("index", index.map(i64::from));

@@ -31,6 +31,7 @@ pub struct Clip {
 }
 
 /// The cells that planes and the faces of a crop box cut through: those of voxels at cut faces (SPEC §3).
+#[cfg(any(feature = "cpu", feature = "gpu"))]
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CutCells {
     /// Rows whose products with (i, j, k, 1) are a voxel's distances from the planes, in extents of a cell along their normals.
@@ -39,12 +40,12 @@ pub(crate) struct CutCells {
     pub(crate) crop: Vec<DVec4>,
 }
 
-/// The slack of distances from planes in extents of cells, for those that meet a cell's very end.
-const FACE_SLACK: f64 = 1e-9;
-
+#[cfg(feature = "cpu")]
 impl CutCells {
     /// Whether one is a voxel's.
     pub(crate) fn contain(&self, voxel: DVec3) -> bool {
+        /// The slack of distances from planes in extents of cells, for those that meet a cell's very end.
+        const FACE_SLACK: f64 = 1e-9;
         let distance = |row: &DVec4| row.dot(voxel.extend(1.0));
         let meets = |row: &DVec4| distance(row).abs() <= 0.5 + FACE_SLACK;
         let touches_box = || self.crop.iter().all(|row| distance(row) >= -0.5 - FACE_SLACK);
@@ -124,6 +125,7 @@ impl Clip {
     }
 
     /// The cells of voxels that are not shaded because cuts go through them; `None` if cut faces are shaded, or nothing is cut.
+    #[cfg(any(feature = "cpu", feature = "gpu"))]
     pub(crate) fn unshaded_cells(&self, grid: &Grid) -> Option<CutCells> {
         if self.shade_faces || self.is_empty() {
             return None;

@@ -354,6 +354,7 @@ impl Splatting {
 
     /// The radius within which a kernel is drawn: after splatting all of it, because where the nearest voxels are equal, voxels of the least weights decide the
     /// direction of a gradient (SPEC §9).
+    #[cfg(feature = "gpu")]
     pub(crate) fn drawn_radius(&self, kernel: &Kernel) -> f64 {
         if self.classification == Classification::After { kernel.radius() } else { kernel.support() }
     }
