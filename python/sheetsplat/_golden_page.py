@@ -32,7 +32,8 @@ body { font: 14px sans-serif; margin: 2em; }
 img { image-rendering: pixelated; display: block; width: calc(var(--width) * var(--zoom, 1) * 1px); }
 .pictures { display: flex; flex-wrap: wrap; gap: 1em; align-items: flex-start; }
 figure { margin: 0; }
-.scroll { overflow: auto; max-width: 90vw; max-height: 80vh; background: repeating-conic-gradient(#999 0 25%, #bbb 0 50%) 0 0 / 16px 16px; }
+.scroll { overflow: auto; max-width: 90vw; max-height: 80vh; }
+.scroll { background: repeating-conic-gradient(#999 0 25%, #bbb 0 50%) 0 0 / 16px 16px; }
 .both { position: relative; width: max-content; cursor: ew-resize; touch-action: none; }
 .both .golden { clip-path: inset(0 calc(100% - var(--at, 50%)) 0 0); }
 .both .found { position: absolute; inset: 0 auto auto 0; clip-path: inset(0 0 0 var(--at, 50%)); }

@@ -49,7 +49,8 @@ p {{ position: fixed; margin: 1em; font: 16px sans-serif; color: #c00; }}
 </html>
 """
 
-# A page without an address may load scripts and start workers from addresses of their bytes, but no worker that is a module, and none that starts others.
+# A page without an address may load scripts and start workers by addresses of their bytes, but no worker that is a module, and
+# none that starts others.
 _SCRIPT = """
 async function unpacked(id) {
   const packed = Uint8Array.from(atob(document.getElementById(id).textContent), (letter) => letter.charCodeAt(0));
@@ -85,7 +86,8 @@ def page(volume: Volume, scene: Scene, still: bytes) -> str:
         files = FILES.read_bytes()
     except OSError as error:
         allowed = "a wheel that was made after `npm run build` in the folder web"
-        raise FileError(error.errno, f"the page's files are not in this package, allowed: {allowed}", str(FILES)) from error
+        message = f"the page's files are not in this package, allowed: {allowed}"
+        raise FileError(error.errno, message, str(FILES)) from error
     if volume.streamed:
         raise refused(VolumeError, "volume", "one that is streamed", "one in memory: a coarser level, or more memory")
     z, y, x = volume.shape

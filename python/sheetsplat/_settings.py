@@ -25,7 +25,7 @@ Side = Literal["front", "back", "left", "right", "top", "bottom", "iso", "xy", "
 
 Opacity = Literal["sigmoid", "linear", "linear_r"]
 
-#: The names of `view`: the direction from the eye into the scene and the screen's up; those of a patient's sides are the volume's.
+#: The names of `view` by axes: the direction from the eye into the scene, and the screen's up.
 VIEWS: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     "iso": ((-1, -1, -1), (0, 0, 1)),
     "xy": ((0, 0, -1), (0, 1, 0)),
@@ -117,9 +117,10 @@ class Splatting(TypedDict, total=False):
 
 
 class Settings(TypedDict, total=False):
-    """What `Scene` takes: the tables of a scene file, and words for some of their keys."""
+    """The settings that `Scene` takes: the tables of a scene file, and words for some of their keys."""
 
-    # Any mapping is a table, too, so that a dictionary that was made elsewhere is no error; editors complete the keys of the typed ones.
+    # Any mapping is a table, too, so that a dictionary that was made elsewhere is no error. Editors complete the keys of the
+    # typed ones.
     preset: Preset
     volume: Mapping[str, Any]
     channel: Sequence[Mapping[str, Any]]
@@ -147,7 +148,7 @@ class Settings(TypedDict, total=False):
 
 
 class Arguments(Settings, total=False):
-    """What `View` takes beside its source."""
+    """The arguments that `View` takes beside its source."""
 
     spacing: float | Sequence[float] | None
     labels: Any

@@ -62,7 +62,7 @@ def read(
     allowed = {"level": False, "time": dimensions > 3, "channel": dimensions > 3}
     for key, number in selection.items():
         if number is not None and not (allowed[key] and channel_axis is None):
-            may_be = "a path, an array with a dimension for it, or for channel and time a DataArray of xarray with such a dim"
+            may_be = "a path, an array with a dimension for it, or a DataArray of xarray with a dim channel or time"
             raise refused(key, f"{number} beside {type(source).__name__}", may_be)
     if channel_axis is not None:
         channels, masked = _channels(source, channel_axis, limit)
@@ -80,7 +80,8 @@ def read(
 def _dimensions(source: Any) -> int:
     """The number of dimensions of an array or an image, as far as that is known before it is computed."""
     if hasattr(source, "GetSpacing"):
-        return len(source.GetSpacing()) + (source.GetNumberOfComponentsPerPixel() > 1 if hasattr(source, "GetNumberOfComponentsPerPixel") else 0)
+        components = getattr(source, "GetNumberOfComponentsPerPixel", lambda: 1)()
+        return len(source.GetSpacing()) + (components > 1)
     shape = getattr(source, "shape", getattr(getattr(source, "dataobj", None), "shape", None))
     if isinstance(shape, tuple):
         return len(shape)
@@ -227,7 +228,8 @@ def array(source: Any, name: str, channels: list[int], limit: str | None) -> tup
     if values.ndim != 3:
         shape = "×".join(map(str, values.shape)) or "a single number"
         field = "shape" if name == "array" else name
-        raise refused(field, f"{values.ndim} dimensions ({shape})", stacks.ALLOWED if name == "array" else "three dimensions z, y, x")
+        allowed = stacks.ALLOWED if name == "array" else "three dimensions z, y, x"
+        raise refused(field, f"{values.ndim} dimensions ({shape})", allowed)
     kind = values.dtype.kind
     if kind not in "biuf":
         raise refused("dtype", str(values.dtype), "integers or floating-point numbers")

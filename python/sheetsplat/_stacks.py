@@ -35,10 +35,11 @@ def is_colors(shape: tuple[int, ...]) -> bool:
 
 
 def colors(values: NDArray[Any]) -> Colors:
-    """The colours that an array `[z, y, x, 3 or 4]` holds: ``uint8``, ``uint16``, other integers from 0 to 255, or floating-point numbers from 0 to 1."""
+    """The colours that an array `[z, y, x, 3 or 4]` holds: integers, or floating-point numbers from 0 to 1."""
     import numpy as np
 
-    kind, allowed = values.dtype.kind, "uint8, uint16, other integers from 0 to 255, or floating-point numbers from 0 to 1"
+    allowed = "uint8, uint16, other integers from 0 to 255, or floating-point numbers from 0 to 1"
+    kind = values.dtype.kind
     if kind not in "iuf":
         raise refused("dtype", f"colours of {values.dtype}", allowed)
     full, name = (1, "f4") if kind == "f" else (65535, "u2") if values.dtype.itemsize == 2 and kind == "u" else (255, "u1")

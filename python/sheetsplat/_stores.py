@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Place", "image_of", "located"]
 
-#: What marks a Zarr store in a mapping.
+#: The keys that mark a Zarr store in a mapping.
 _MARKS = ("zarr.json", ".zgroup", ".zarray")
 
 
@@ -62,7 +62,8 @@ def _of_file(file: Any) -> Place:
         # Whatever a file of another library raises.
         raise refused("file", f"{type(error).__name__}: {error}", "an open file that can be read") from error
     if not isinstance(content, bytes):
-        raise refused("file", f"{type(content).__name__} in {name}", "a file that is open in binary mode, as open(name, 'rb') does")
+        allowed = "a file that is open in binary mode, as open(name, 'rb') does"
+        raise refused("file", f"{type(content).__name__} in {name}", allowed)
     return Place(os.path.basename(name), content)
 
 
@@ -78,7 +79,8 @@ def _of_file_system(system: Any, path: Any, within: str) -> Place | None:
 def _image_within(group: Any) -> str | None:
     """The path within a store of a group's image, or of its only array; `None` if it has neither."""
     attributes, path = dict(group.attrs), str(getattr(group, "path", "")).strip("/")
-    if "multiscales" in attributes.get("ome", attributes) or "bioformats2raw.layout" in attributes.get("ome", attributes):
+    stated = attributes.get("ome", attributes)
+    if "multiscales" in stated or "bioformats2raw.layout" in stated:
         return path
     members = [name for name, _ in group.arrays()]
     return f"{path}/{members[0]}".strip("/") if len(members) == 1 else None
@@ -130,10 +132,11 @@ def _levels(arrays: list[Any], axes: Any, transformations: Any, level: int | Non
         raise refused("level", str(number), f"0 to {len(arrays) - 1}" if arrays else "an image with a level")
     if not axes:
         return arrays[number]
-    names, units = zip(*((axis, None) if isinstance(axis, str) else (axis["name"], axis.get("unit")) for axis in axes), strict=True)
+    facts = [{"name": axis} if isinstance(axis, str) else axis for axis in axes]
+    names, units = [axis["name"] for axis in facts], [axis.get("unit") for axis in facts]
     steps = (transformations or [None] * len(arrays))[number] or []
     scale = next((step["scale"] for step in steps if step.get("type") == "scale"), [1.0] * len(names))
-    return Named(arrays[number], names, tuple(zip(scale, units, strict=True)))
+    return Named(arrays[number], tuple(names), tuple(zip(scale, units, strict=True)))
 
 
 class _Coordinates:

@@ -27,7 +27,7 @@ class Said(NamedTuple):
     value: Any
 
 
-#: What has two names is one word.
+#: Words that have two names.
 _ALIASES = {"colormap": "cmap", "side": "view"}
 
 #: The keys that words are, by the words. A word and one of its keys in one call are an error; in two calls the last one counts.
@@ -267,7 +267,8 @@ def _ends(words: Mapping[str, Said], of_volume: tuple[float, float] | None = Non
     if not low < high:
         name = "vmin" if "vmin" in words else "vmax"
         found = f"values from {low:g} to {high:g}"
-        raise refused(SceneError, name, found, "a minimum below the maximum, of the volume's values where one of the two is not stated")
+        allowed = "a minimum below the maximum; one that is not stated is that of the volume's values"
+        raise refused(SceneError, name, found, allowed)
     return low, high
 
 
@@ -369,7 +370,7 @@ def _replaced(scene: native.Scene, words: Mapping[str, Said], keys: dict[str, An
     try:
         return scene.replaced(keys)
     except SceneError as error:
-        # Of a range and opacities over it, the opacities are wrong.
+        # Opacities over a range are wrong themselves, not the range.
         order = sorted(words, key=lambda of: of in ("clim", "vmin", "vmax"))
         names = [words[of].name for of in order if _is_one_of(error.key, _KEYS.get(of, ()))]
         if word is None and not names:

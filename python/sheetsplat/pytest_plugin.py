@@ -23,7 +23,7 @@ import pytest
 
 from ._golden_page import Compared, page
 
-#: What a worker of pytest-xdist sends its controller at its end, by this name.
+#: The name by which a worker of pytest-xdist sends its comparisons to its controller, at its end.
 _SENT = "sheetsplat_goldens"
 
 #: The variable that names the goldens to bless.

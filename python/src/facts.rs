@@ -1,4 +1,4 @@
-//! What a volume holds, as arrays and numbers of which the same volume can be made again.
+//! The contents of a volume, as arrays and numbers of which the same volume can be made again.
 
 use std::sync::Arc;
 

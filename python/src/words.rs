@@ -1,4 +1,4 @@
-//! What the words of Python's functions, such as `cmap=` and `azimuth=`, need to become the keys of scenes.
+//! Facts by which the words of Python's functions, such as `cmap=` and `azimuth=`, become the keys of scenes.
 
 use pyo3::prelude::*;
 use sheetsplat::appearance::Colormap;

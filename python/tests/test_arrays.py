@@ -168,7 +168,7 @@ def test_labels_are_whole_numbers() -> None:
 
 @pytest.mark.parametrize("dtype", ["i4", "u4", "i8", "u8", "f8"])
 def test_labels_beyond_16_bits_are_exact(dtype: str) -> None:
-    """As in files: tables, names and pickles speak the array's own numbers."""
+    """Tables and pickles speak the array's own numbers, as they do a file's."""
     values = voxels()
     labels = np.zeros(values.shape, dtype)
     labels[2:] = 100_000
@@ -181,7 +181,9 @@ def test_labels_beyond_16_bits_are_exact(dtype: str) -> None:
         table = [{"label": 0, "visible": False}, {"label": 100_000, "color": [[0, [1, 0, 0]]], "opacity": [[0, 0.9]]}]
         small = {"image": {"width": 24, "height": 24}}
         red = sheetsplat.render(volume, transfer={"label": table}, **small)
-        direct = sheetsplat.render(values, labels=np.unique(labels, return_inverse=True)[1].reshape(labels.shape), transfer={"label": [table[0], {**table[1], "label": 1}]}, **small)
+        places = np.unique(labels, return_inverse=True)[1].reshape(labels.shape)
+        by_place = {"label": [table[0], {**table[1], "label": 1}]}
+        direct = sheetsplat.render(values, labels=places, transfer=by_place, **small)
         assert red == direct and np.asarray(red)[..., 0].max() > 0.1
     labels[0, 0, 0] = 3
     negative = labels.astype("f8")

@@ -43,7 +43,7 @@ def contents(path: pathlib.Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("kind", ["values", "labels", "channels", "colors", "patient", "floats"])
 def test_the_volume_and_the_scene_are_in_the_page(kind: str, made: None, tmp_path: pathlib.Path) -> None:
-    """What is in a page is drawn as the view draws it, when its camera turns."""
+    """A page's scene and volume are drawn as the view draws them when its camera turns."""
     source: Any = {
         "values": ball(),
         "labels": ball(),

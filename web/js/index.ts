@@ -26,7 +26,7 @@ export interface Options {
     fit?: boolean;
     /** The folder of the WebAssembly files, if they do not lie beside this script. */
     base?: URL | string;
-    /** The worker, if the page cannot load `worker.js` by its address, such as one that is a single file. It draws on the CPU, by `module` and without helpers. */
+    /** The worker, if the page cannot load `worker.js` by its address, such as one that is a single file: it draws on the CPU by `module`, without helpers. */
     worker?: Worker;
     /** The compiled library for the CPU, if the page cannot load its file by an address. */
     module?: WebAssembly.Module;
