@@ -9,13 +9,16 @@ from __future__ import annotations
 import difflib
 import tomllib
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from . import _colors as colors
 from . import _native as native
 from ._checks import finite, refused, whole
 from ._settings import VIEWS, Arguments, Settings
 from .errors import SceneError
+
+if TYPE_CHECKING:
+    from .volume import Volume
 
 __all__ = ["ARGUMENTS", "OF_CAMERA", "SETTINGS", "Said", "check_names", "merged", "plain", "settled", "split", "stated"]
 
@@ -303,15 +306,16 @@ def _check_window(scene: native.Scene, words: Mapping[str, Said]) -> None:
 
 
 def settled(
-    bare: native.Scene, words: Mapping[str, Said], volume: native.Volume, all_around: bool, annotate: Sequence[str]
+    bare: native.Scene, words: Mapping[str, Said], of: Volume, all_around: bool, annotate: Sequence[str]
 ) -> native.Scene:
     """A scene with all words as the keys that they are for a volume."""
     scene, unknown = stated(bare, words)
     if not unknown:
         return scene
+    volume = of._native
     if "only" in words:
         scene = _alone(scene, words["only"].value, volume)
-    scene = _colored(scene, words, volume)
+    scene = _colored(scene, words, of)
     if "view" in words:
         scene = _seen(scene, words["view"], volume)
     angles = [words[name].value if name in words else 0.0 for name in ("azimuth", "elevation")]
@@ -343,18 +347,18 @@ def _seen(scene: native.Scene, side: Said, volume: native.Volume) -> native.Scen
     return scene.replaced({"camera.direction": camera["direction"], "camera.up": camera["up"]})
 
 
-def _colored(scene: native.Scene, words: Mapping[str, Said], volume: native.Volume) -> native.Scene:
+def _colored(scene: native.Scene, words: Mapping[str, Said], volume: Volume) -> native.Scene:
     """A scene with colours and opacities over ranges of values that the volume has."""
     if not {"cmap", "opacity", "vmin", "vmax"} & words.keys() or _ends(words) is not None:
         return scene
-    least, most = native.value_range(volume)
+    least, most = volume._ends()
     if _has_ends(words):
         ends = _ends(words, (least, most))
         return _replaced(scene, words, _transfer(words, ends)) if ends is not None else scene
     if "opacity" in words and not isinstance(words["opacity"].value[0], list):
         scene = _replaced(scene, words, {"transfer.opacity": colors.over(words["opacity"].value, least, most)})
     if "cmap" in words and not isinstance(words["cmap"].value, str):
-        scene = _replaced(scene, words, {"transfer.color": colors.over(words["cmap"].value, *_visible(scene, volume))})
+        scene = _replaced(scene, words, {"transfer.color": colors.over(words["cmap"].value, *_visible(scene, volume._native))})
     return scene
 
 

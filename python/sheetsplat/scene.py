@@ -131,7 +131,7 @@ class Scene:
         """The scene with all its words as keys, for a volume."""
         if not self._words:
             return self
-        return Scene._of(words.settled(self._bare, self._words, volume._native, all_around, annotate))
+        return Scene._of(words.settled(self._bare, self._words, volume, all_around, annotate))
 
     @property
     def _opening(self) -> native.Scene:

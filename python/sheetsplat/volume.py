@@ -218,6 +218,12 @@ class Volume:
         """
         return self._native.info()
 
+    def _ends(self) -> tuple[float, float]:
+        """The minimum and the maximum of the values of all channels."""
+        if self._range is None:
+            self._range = native.value_range(self._native)
+        return self._range
+
     def __reduce__(self) -> Any:
         if self._origin is not None:
             labels = native.label_array(self._native) if self._origin.has_labels else None
@@ -233,9 +239,7 @@ class Volume:
         facts = [f"{z}×{y}×{x} voxels", f"spacing {self.spacing}" + (f" {self.unit}" if self.unit else "")]
         if self.channels > 1:
             facts.append(f"{self.channels} channels")
-        if self._range is None:
-            self._range = native.value_range(self._native)
-        facts.append("values {:g} to {:g}".format(*self._range))
+        facts.append("values {:g} to {:g}".format(*self._ends()))
         kept = {"holes": self.holes > 0, "labels": self._native.labelled, "streamed": self.streamed}
         facts += [fact for fact, is_there in kept.items() if is_there]
         if self._origin is not None and isinstance(self._origin.what, str):

@@ -353,3 +353,21 @@ def test_a_process_that_draws_ends_cleanly() -> None:
     code = "import sheetsplat; sheetsplat.Widget('builtin:head:64', image={'width': 200, 'height': 200})"
     result = subprocess.run([sys.executable, "-X", "faulthandler", "-c", code], capture_output=True, text=True, timeout=300)
     assert (result.returncode, result.stderr) == (0, "")
+
+
+def test_words() -> None:
+    """The camera that the words place is the home of the widget, which `set` keeps unless a word of the camera is said."""
+    words = {"view": "xz", "azimuth": 20, "zoom": 1.5, "cmap": "hot_r", "size": (24, 20)}
+    widget = Widget("builtin:head:16", **words)
+    view = sheetsplat.View("builtin:head:16", **words)
+    assert widget.image == next(view.orbit(count=1))
+    np.testing.assert_allclose(widget.scene.to_dict()["camera"]["direction"], view.scene.to_dict()["camera"]["direction"])
+    widget.azimuth = 30
+    widget.set(cmap="gray")
+    assert widget.azimuth == 30 and "colormap" in widget.scene.to_dict()["transfer"]
+    widget.set(azimuth=40)
+    assert widget.azimuth == 0
+    turned = sheetsplat.View("builtin:head:16", **{**words, "azimuth": 40, "cmap": "gray"})
+    assert widget.image == next(turned.orbit(count=1))
+    with pytest.raises(sheetsplat.SceneError, match=r"zom: found an unknown keyword \(perhaps zoom\)"):
+        widget.set(zom=2)
