@@ -187,7 +187,7 @@ class View:
         return Image._of(array, json.loads(stats), made_on, self._inputs)
 
     def to_html(self, path: str | os.PathLike[str]) -> None:
-        """Saves a page of one file, in which the volume turns in any browser, without a network.
+        """Saves a page of one file, in which the volume turns in a browser of 2023 or later, without a network.
 
         The page has the library for the CPU in it, which takes 0.9 MB, and the volume with its labels. Words beside the
         picture (`annotate`) are left out.
