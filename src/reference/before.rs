@@ -8,6 +8,7 @@ use std::sync::Arc;
 use glam::DVec4;
 
 use super::first_hit::FirstHits;
+use super::framed::framed;
 use super::visibility::{OpaqueMask, Test};
 use super::{Areas, Buffer, Culled, Cuts, Geometry, Host, Lights, Means, Section, Splat};
 use super::{composite, resolve, shading, sheets, splat};
@@ -38,7 +39,7 @@ impl Frame {
         transfer: &[TransferFunction],
         (scene, lights): (&Scene, Option<&Arc<Lights>>),
     ) -> Result<Self, RenderError> {
-        let scene = &super::framed(volume, transfer, scene)?;
+        let scene = &framed(volume, transfer, scene)?;
         let geometry = Geometry::new(volume.grid(), scene)?;
         let kernel = Kernel::new(scene.splatting.radius, scene.splatting.falloff);
         let voxels = shading::taking_part(volume, transfer, &geometry);

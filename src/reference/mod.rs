@@ -9,6 +9,7 @@ mod culled;
 pub mod cut;
 mod first_hit;
 pub mod footprint;
+mod framed;
 pub mod geometry;
 mod host;
 pub mod light;
@@ -42,6 +43,7 @@ use crate::volume::Volume;
 pub use buffer::Buffer;
 pub use culled::Culled;
 pub use cut::Cuts;
+use framed::framed;
 pub use geometry::Geometry;
 pub use host::Host;
 pub use light::Lights;
@@ -128,13 +130,6 @@ fn render_lit(
 fn joining(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Option<Joining> {
     let (count, compositing) = (channels(volume, transfer).count(), scene.splatting.compositing);
     Joining::of_channels(count, compositing, scene.classification(volume))
-}
-
-/// A scene with its camera's frame. The settings are checked first, because framing needs valid ones.
-fn framed(volume: &Volume, transfer: &[TransferFunction], scene: &Scene) -> Result<Scene, SettingError> {
-    scene.check()?;
-    TransferFunction::check_channels(transfer)?;
-    Ok(scene.framed(volume, transfer))
 }
 
 /// Renders every channel by itself, and joins the images (SPEC §10).

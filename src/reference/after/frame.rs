@@ -10,7 +10,7 @@ use super::low_pass::LowPass;
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::lists::classify::channels;
-use crate::reference::framed;
+use crate::reference::framed::framed;
 use crate::reference::{Geometry, Host, Lights};
 use crate::scene::Scene;
 use crate::settings::transfer_function::TransferFunction;
