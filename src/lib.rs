@@ -102,7 +102,10 @@
 //! that take part · *label* the number of the segment that a voxel of a segmented volume belongs to
 //! ([`Volume::labels`]) · *brick* 4×4×4 neighbouring voxels · *tile* a square of 32×32 pixels.
 
-#[cfg_attr(not(feature = "cpu"), expect(dead_code, reason = "only the native backend stops early"))]
+#[cfg_attr(
+    not(any(feature = "cpu", feature = "codecs")),
+    expect(dead_code, reason = "only drawing and writing stop early")
+)]
 mod abandon;
 mod after;
 #[cfg(feature = "annotate")]
