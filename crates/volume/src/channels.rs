@@ -169,3 +169,21 @@ impl Volume {
         self.channel_name.as_deref()
     }
 }
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_list_is_never_empty() {
+        assert_eq!(Channels::<u8>::of([]), None);
+        let mut list = Channels::of([3, 4, 5]).unwrap();
+        assert_eq!(list, Channels::new(3, [4, 5]));
+        list.truncate(0);
+        assert_eq!((list.len(), *list.first()), (1, 3));
+        list.push(7);
+        assert_eq!(list.clone().map(|item| item * 2)[..], [6, 14]);
+        assert_eq!(list.try_map(|item| if item == 7 { Err("seven") } else { Ok(item) }), Err("seven"));
+    }
+}
