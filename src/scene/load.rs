@@ -168,7 +168,8 @@ fn channel(settings: &Channel, key: &str, access: &Access) -> Result<Volume, Vol
         }
         None => volume,
     };
-    let volume = match &settings.label_table {
+    // A page, whose size counts, has no such key.
+    let volume = match settings.label_table.as_ref().filter(|_| cfg!(not(target_arch = "wasm32"))) {
         Some(path) => volume.with_label_table(&LabelTable::read(path, access)?)?,
         None => volume,
     };

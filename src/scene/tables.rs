@@ -152,10 +152,12 @@ fn volume(mut section: Section, folder: &Path, given: Option<VolumeSource>) -> R
     section.read("labels", &mut labels, |entry| {
         entry.text("a label file's path").map(|path| Some(written_in(folder, &path)))
     })?;
-    section.read("label_table", &mut label_table, |entry| {
-        let text = entry.text("a table's path, or builtin:freesurfer")?;
-        Ok(Some(if text.starts_with("builtin:") { text.into() } else { written_in(folder, &text) }))
-    })?;
+    if cfg!(not(target_arch = "wasm32")) {
+        section.read("label_table", &mut label_table, |entry| {
+            let text = entry.text("a table's path, or builtin:freesurfer")?;
+            Ok(Some(if text.starts_with("builtin:") { text.into() } else { written_in(folder, &text) }))
+        })?;
+    }
     let (mut index, mut time, mut level) = (None, None, None);
     section.read("index", &mut index, |entry| entry.count().map(Some))?;
     section.read("time", &mut time, |entry| entry.count().map(Some))?;
