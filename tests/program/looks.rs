@@ -150,6 +150,8 @@ fn labels_have_a_tables_names_and_colours() {
     let (_, _, pixels) = folder.pixels("bone.toml");
     assert!(pixels.iter().any(|[r, ..]| *r > 0.1) && pixels.iter().all(|[_, g, b, _]| g == b));
     folder.render(&format!("{head}=builtin:freesurfer --only Left-Cerebral-White-Matter -o white.npy"));
+    let preset = "builtin:head:32 --preset freesurfer --size 40 --backend cpu --only Left-Cerebral-White-Matter";
+    assert_eq!(folder.pixels(preset).2, folder.read_npy("white.npy").2);
     folder.write("wrong.txt", "2 bone 255 0\n");
     for (table, found) in
         [("wrong.txt", "wrong.txt: line 1: found 2 bone 255 0, allowed: "), ("builtin:allen", "label table: found ")]

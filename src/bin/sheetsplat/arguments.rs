@@ -21,7 +21,7 @@ use crate::reading::Reading;
 use crate::stdin;
 
 /// The flags that set keys of the scene, in the order in which they are applied.
-const FLAGS: [(&str, &str); 15] = [
+const FLAGS: [(&str, &str); 16] = [
     ("--dims", "volume.dims"),
     ("--type", "volume.type"),
     ("--endian", "volume.endian"),
@@ -32,12 +32,16 @@ const FLAGS: [(&str, &str); 15] = [
     ("--level", "volume.level"),
     ("--series", "volume.series"),
     ("--preset", "preset"),
+    ("--preset", "volume.label_table"),
     ("--colormap", "transfer.colormap"),
     ("--size", "image.width"),
     ("--size", "image.height"),
     ("--background", "image.background"),
     ("--window", "transfer.opacity"),
 ];
+
+/// The preset of label maps with a table of labels.
+const FREESURFER: &str = "freesurfer";
 
 /// The scene to draw, and the adapter.
 #[derive(clap::Args)]
@@ -108,8 +112,8 @@ fn parse_window(text: &str) -> Result<[f64; 2], String> {
 #[derive(clap::Args)]
 struct Look {
     /// Transfer function, shading and compositing for a kind of data, where the scene states none: short for --set
-    /// preset=NAME.
-    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name)))]
+    /// preset=NAME. freesurfer is labels with the names and colours of FreeSurfer's: volume.label_table=builtin:freesurfer.
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Preset::ALL.map(|(name, _)| name).into_iter().chain([FREESURFER])))]
     preset: Option<String>,
     /// The picture's size in pixels, or a window's in points: short for --set image.width=W and image.height=H. W alone is square.
     #[arg(long, value_name = "W[xH]", value_parser = parse_size)]
@@ -264,7 +268,8 @@ impl Input {
             level.clone(),
             // Text, because an identity may look like a number.
             series.as_ref().map(|text| format!("{text:?}")),
-            preset.clone(),
+            preset.as_deref().map(|name| if name == FREESURFER { "labels" } else { name }.to_owned()),
+            preset.as_deref().filter(|name| *name == FREESURFER).map(|name| format!("builtin:{name}")),
             colormap.clone(),
             width,
             height,
@@ -299,6 +304,7 @@ impl Input {
         for channel in &scene.channels {
             files.extend(channel.volume.path().map(Path::to_path_buf));
             files.extend(channel.labels.clone());
+            files.extend(channel.label_table.clone());
         }
         files
     }
