@@ -1,4 +1,4 @@
-//! The stretch of each ray over which means of sheets count ([`Compositing::is_by_means`]).
+//! The stretch of each ray over which means of sheets count ([`Compositing::is_by_means`](crate::settings::splatting::Compositing::is_by_means)).
 
 use std::ops::Range;
 

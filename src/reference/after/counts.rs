@@ -40,7 +40,7 @@ struct Reach {
     distance: f64,
 }
 
-/// The counts of the frame that [`super::render_for`] draws.
+/// The counts of the frame that [`crate::reference::render_for`] draws.
 ///
 /// # Errors
 /// If the scene needs more than can be computed.
