@@ -16,6 +16,9 @@ SCRIPT = """
 import os, signal, sys, threading, time
 import sheetsplat
 
+# Processes that a shell starts in the background ignore Ctrl-C, and so do their children.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
 def interrupted(work, after=0.3):
     sent = []
     def send():
