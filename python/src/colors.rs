@@ -7,11 +7,9 @@ use sheetsplat::glam;
 use sheetsplat::volume::{Inputs, Orientation, SampleType};
 
 use crate::error::{self, Raised};
+use crate::facts::Placement;
 use crate::process::detached;
 use crate::volume::{ORIGIN, Volume, check_spacing, warn_of_holes, zyx};
-
-/// The directions of x, y and z in the patient (RAS), and the position of the first voxel.
-type Placement = ([[f64; 3]; 3], [f64; 3]);
 
 /// A volume of colours from an array `[z, y, x, 4]` of red, green, blue and A, as numbers that a type of samples has: shares of its maximum, or of 1.
 #[pyfunction]

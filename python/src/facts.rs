@@ -11,9 +11,9 @@ use crate::process::{detached, prepare_numpy};
 use crate::volume::{Volume, extent_and_mean};
 
 /// The directions of x, y and z in the patient (RAS), and the position of the first voxel.
-type Placement = ([[f64; 3]; 3], [f64; 3]);
+pub(crate) type Placement = ([[f64; 3]; 3], [f64; 3]);
 
-/// The minimum and the maximum of the values of all channels; of a volume that is streamed, those of its sample. NaN if there is none.
+/// The least and the greatest value in all channels. A streamed volume's are those of its sample. Both are NaN for a volume of holes.
 #[pyfunction]
 pub(crate) fn value_range(py: Python<'_>, volume: &Volume) -> PyResult<[f64; 2]> {
     let sample = Arc::clone(volume.0.sample());

@@ -32,11 +32,11 @@ pub enum Bearing {
 impl Bearing {
     /// The values that bear on images composited this way.
     pub fn of(compositing: Compositing) -> Self {
-        match compositing.is_choice() {
-            false => Self::Own,
-            true if compositing.is_average() => Self::All,
-            true if compositing.keeps_least() => Self::Smaller,
-            true => Self::Greater,
+        match compositing {
+            Compositing::Maximum => Self::Greater,
+            Compositing::Minimum => Self::Smaller,
+            Compositing::Average => Self::All,
+            _ => Self::Own,
         }
     }
 

@@ -15,7 +15,7 @@ const MOST_NAMES: usize = 40;
 
 impl Scene {
     /// The scene of a volume with one label alone. `label` is its name, or its number in the file ([`Volume::label_ids`]); labels of one name are shown together.
-    /// Of labels beside values all others are hidden. Of a label map the iso-ranges become this label's values. What the scene leaves open of the appearance is
+    /// In a segmented volume, all other labels are hidden. In a label map, the iso-ranges become the label's values. The appearance that the scene leaves open is
     /// stated, as [`Scene::fitted`] chooses it.
     ///
     /// # Errors
@@ -31,25 +31,24 @@ impl Scene {
         if chosen.is_empty() {
             chosen.extend(label.parse().ok().and_then(|id| volume.label_of_id(id)));
         }
+        // The volume's labels, if the chosen ones are among them.
+        let found = |present: Vec<u16>| match present.iter().any(|label| chosen.contains(label)) {
+            true => Ok(present),
+            false => Err(refused(allowed(volume, &present))),
+        };
         match volume.labels() {
             Some(_) if volume.drawn_grid() != volume.grid() => {
                 return Err(refused("a volume with labels that fits into memory".to_owned()));
             }
             Some(labels) => {
-                let present = present(labels.iter().copied());
-                if chosen.is_disjoint(&present) {
-                    return Err(refused(allowed(volume, present)));
-                }
+                let present = found(categories::distinct(labels))?;
                 let of_labels = &mut scene.channels.first_mut().transfer.labels;
                 for label in present {
                     of_labels.entry(volume.label_id(label)).or_default().visible = chosen.contains(&label);
                 }
             }
             None if is_map() => {
-                let present = present(volume.values().iter().filter(|value| !value.is_nan()).map(|value| value as u16));
-                if chosen.is_disjoint(&present) {
-                    return Err(refused(allowed(volume, present)));
-                }
+                found(categories::values(volume).unwrap_or_default())?;
                 let ids = chosen.iter().map(|&label| volume.label_id(label) as f64);
                 scene.channels.first_mut().transfer.iso_ranges = Some(ids.map(|id| [id, id]).collect());
             }
@@ -59,15 +58,8 @@ impl Scene {
     }
 }
 
-/// The labels among those of many voxels.
-fn present(labels: impl Iterator<Item = u16>) -> BTreeSet<u16> {
-    let mut is_present = vec![false; 1 << 16];
-    labels.for_each(|label| is_present[usize::from(label)] = true);
-    (0..=u16::MAX).filter(|&label| is_present[usize::from(label)]).collect()
-}
-
 /// The labels of a volume, by name or else by number.
-fn allowed(volume: &Volume, present: BTreeSet<u16>) -> String {
+fn allowed(volume: &Volume, present: &[u16]) -> String {
     let name = |label: &u16| match volume.label_names().get(label) {
         Some(name) => format!("\"{name}\""),
         None => volume.label_id(*label).to_string(),

@@ -158,3 +158,19 @@ fn times_are_swept() {
     };
     assert!(tile(0) != tile(1), "the times differ");
 }
+
+/// Every key of a volume makes another one, not only its file.
+#[test]
+fn tables_of_labels_are_swept() {
+    let folder = Folder::new();
+    folder.write("red.txt", "1 skin 255 0 0\n");
+    folder.write("blue.txt", "1 skin 0 0 255\n");
+    let look = "builtin:head:16 --preset labels --set image={width=300,height=40}";
+    let sheet = folder.sweep(&format!("{look} --set volume.label_table=red.txt,blue.txt"));
+    let tile = |column: u32, name: &str| {
+        let corner = [MARGIN + column * (WIDTH + MARGIN), MARGIN];
+        folder.assert_tile(&sheet, corner, &format!("{look} --set volume.label_table={name}.txt"));
+        image::imageops::crop_imm(&sheet, corner[0], corner[1], WIDTH, HEIGHT).to_image()
+    };
+    assert!(tile(0, "red") != tile(1, "blue"), "the tables differ");
+}

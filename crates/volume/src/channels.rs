@@ -15,7 +15,7 @@ impl<T> Channels<T> {
         Self(std::iter::once(first).chain(others).collect())
     }
 
-    /// The list of some items; `None` if there are none.
+    /// Makes a list of items; `None` if `items` is empty.
     pub fn of(items: impl IntoIterator<Item = T>) -> Option<Self> {
         let items: Vec<T> = items.into_iter().collect();
         (!items.is_empty()).then_some(Self(items))
@@ -143,7 +143,7 @@ impl Volume {
         std::iter::once(self).chain(&self.others)
     }
 
-    /// What a function makes of every channel, given its number from 0.
+    /// Calls a function with every channel and its number, from 0 on, and lists the results.
     pub fn each_channel<T>(&self, mut of: impl FnMut(usize, &Self) -> T) -> Channels<T> {
         Channels(self.channels().enumerate().map(|(number, channel)| of(number, channel)).collect())
     }

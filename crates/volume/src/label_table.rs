@@ -34,7 +34,7 @@ impl LabelTable {
     /// Reads a table.
     ///
     /// # Errors
-    /// If the file cannot be read, has more than 16 MiB, or a line is none of a table. The error names the file and the line.
+    /// If the file cannot be read, has more than 16 MiB, or has a line of another form. The error names the file and the line.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Self, VolumeError> {
         Self::read(path, &Access::new(options)?)
     }

@@ -336,7 +336,7 @@ fn read_every(
         };
         Ok(sample)
     };
-    let sample = |channel: &StreamedChannel| {
+    let sample = |channel: StreamedChannel| {
         let values = read(&channel.values)?;
         let Some(labels) = &channel.labels else { return Ok(values) };
         let own = read(labels)?;
@@ -348,10 +348,8 @@ fn read_every(
             names: labels.store.facts().label_names,
         })
     };
-    let mut samples = channels.iter().map(sample).collect::<Result<Vec<_>, VolumeError>>()?;
-    let others = samples.split_off(1);
-    let first = samples.remove(0).with_channels(&channels.first().values.origin, others)?;
-    Ok(Volume { reads: Some(reads), ..first })
+    let samples = channels.clone().try_map(sample)?;
+    Ok(Volume { reads: Some(reads), ..Volume::of_channels(&channels.first().values.origin, samples)? })
 }
 
 impl Volume {

@@ -47,7 +47,7 @@ impl<'a> Frame<'a> {
         Ok(first.ok_or_else(|| SettingError::new("channel", "none", "at least one"))?)
     }
 
-    /// Those of all channels, which share everything that depends on the view; `lights` are those of all channels, where one of them is drawn by itself.
+    /// The frames of all channels, which share what depends on the view. Where one channel is drawn by itself, `lights` still holds the light of all.
     ///
     /// # Errors
     /// If the scene needs more than can be computed.

@@ -6,7 +6,7 @@ mod sheet;
 use std::path::PathBuf;
 
 use sheetsplat::image::Image;
-use sheetsplat::scene::{Channel, OpenVolume, Scene};
+use sheetsplat::scene::{Channel, OpenVolume, Scene, TransferSettings};
 
 use crate::annotate::Annotate;
 use crate::arguments::{Depth, Input, log_frame};
@@ -129,14 +129,14 @@ fn check_volumes(input: &Input, scenes: &[(Scene, Vec<String>)], outputs: &Outpu
 }
 
 fn has_same_volume(a: &Scene, b: &Scene) -> bool {
-    let facts = |scene: &Scene| -> Vec<_> {
-        let of = |channel: &Channel| {
-            let Channel { volume, spacing, labels, index, time, level, .. } = channel.clone();
-            (volume, spacing, labels, index, time, level)
-        };
-        scene.channels.iter().map(of).collect()
+    // Appearance aside, every key of a channel is one of its volume.
+    let volumes = |scene: &Scene| {
+        scene.channels.clone().map(|mut channel: Channel| {
+            (channel.name, channel.visible, channel.transfer) = (None, true, TransferSettings::default());
+            channel
+        })
     };
-    facts(a) == facts(b)
+    volumes(a) == volumes(b)
 }
 
 /// Draws every scene. A volume is loaded again only if it differs from the previous one.
