@@ -316,6 +316,7 @@ impl ZarrArray {
                 self.copy(place, &chunk, region, values);
             }
         }
+        self.keys.check_presence()?;
         Ok(held)
     }
 
@@ -422,6 +423,7 @@ impl ZarrArray {
             }
         };
         if !is_held {
+            self.keys.check_presence()?;
             self.check_absent(place)?;
         }
         Ok(is_held)

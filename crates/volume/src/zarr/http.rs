@@ -5,7 +5,8 @@ use std::fmt::Write;
 use std::io::{ErrorKind, Read};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -15,6 +16,7 @@ use ureq::{Agent, Body, Error};
 
 use super::super::VolumeError;
 use super::super::error::volume::{invalid, io_error};
+use super::super::source::MAX_HEADER;
 
 /// The maximum number of redirects that a request follows.
 const MAX_REDIRECTS: u32 = 5;
@@ -61,6 +63,10 @@ pub(super) struct Http {
     limits: Limits,
     /// The lengths of values that are known; `None` for keys that the store does not hold.
     lengths: Mutex<HashMap<String, Option<u64>>>,
+    /// The first key that the store held, which are its metadata.
+    first: OnceLock<String>,
+    /// Whether a key was missing since the store was last known to be there.
+    has_missed: AtomicBool,
 }
 
 /// Why a request failed.
@@ -101,13 +107,32 @@ impl Http {
             .max_idle_connections_per_host(CONNECTIONS)
             .user_agent(concat!("sheetsplat/", env!("CARGO_PKG_VERSION")))
             .build();
-        let (agent, lengths) = (Agent::new_with_config(config), Mutex::default());
-        Ok(Self { agent, root: root.trim_end_matches('/').to_owned(), query, limits, lengths })
+        Ok(Self {
+            agent: Agent::new_with_config(config),
+            root: root.trim_end_matches('/').to_owned(),
+            query,
+            limits,
+            lengths: Mutex::default(),
+            first: OnceLock::new(),
+            has_missed: AtomicBool::new(false),
+        })
     }
 
     /// The place of a key, for errors: without the query, which may be a secret.
     pub(super) fn place(&self, key: &str) -> PathBuf {
         PathBuf::from(format!("{}/{key}", self.root))
+    }
+
+    /// Checks that the store is still there, if a key was missing since that was last known.
+    ///
+    /// # Errors
+    /// If the metadata that the store was opened by are gone: the missing keys then tell nothing about the volume.
+    pub(super) fn check_presence(&self) -> Result<(), VolumeError> {
+        let Some(first) = self.first.get() else { return Ok(()) };
+        if self.has_missed.swap(false, Ordering::SeqCst) && self.whole(first, MAX_HEADER)?.is_none() {
+            return Err(io_error(&self.place(first))(ErrorKind::NotFound.into()));
+        }
+        Ok(())
     }
 
     /// The length of a key's value; `None` if the store has no such key.
@@ -209,11 +234,17 @@ impl Http {
         let response = request.call().map_err(|error| self.failure(key, error))?;
         let status = response.status().as_u16();
         match status {
-            200 => Ok(Some(response)),
+            200 => {
+                self.first.get_or_init(|| key.to_owned());
+                Ok(Some(response))
+            }
             // An empty value has no range.
             206 | 416 if is_range => Ok(Some(response)),
             // For a key that it does not hold, an object store answers 403 instead of 404 if the keys may not be listed.
-            403 | 404 | 410 => Ok(None),
+            403 | 404 | 410 => {
+                self.has_missed.store(true, Ordering::SeqCst);
+                Ok(None)
+            }
             _ => {
                 let allowed = "200 or 206, or 404 or 403 for a key that the store does not hold";
                 let error = invalid(&self.place(key), "status", status, allowed);

@@ -125,6 +125,15 @@ impl Keys {
         self.range(key, 0..bytes).map(Some)
     }
 
+    /// Checks that a store at an address is still there, if it did not hold a key. A folder's listings tell that by themselves.
+    pub(super) fn check_presence(&self) -> Result<(), VolumeError> {
+        match &self.place {
+            Place::Folder(_) | Place::Archive(..) => Ok(()),
+            #[cfg(feature = "http")]
+            Place::Address(http) => http.check_presence(),
+        }
+    }
+
     /// The length of a key's value; `None` if the store has no such key.
     pub(super) fn bytes(&self, key: &str) -> Result<Option<u64>, VolumeError> {
         match &self.place {

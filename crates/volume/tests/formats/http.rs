@@ -1,13 +1,14 @@
 //! Zarr stores that are read over HTTP, from a server in this process.
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::Path;
 
 use glam::UVec3;
 use sheetsplat_volume::{Files, ReadOptions, Volume, VolumeError, open_store};
 
 use super::server::Server;
-use super::{DIMS, fixture, values};
+use super::{DIMS, Folder, fixture, values};
 
 /// An image of whole chunks, and one of shards.
 const STORES: [&str; 2] = ["image-0.5.zarr", "ngff.zarr"];
@@ -73,6 +74,35 @@ fn chunks_are_asked_for_once() {
     let bytes = store.read(0, UVec3::new(4, 3, 2), UVec3::ONE, &mut value).unwrap();
     assert_eq!((value, chunks(&server)), ([1234.0], vec!["0/0/1/0/0 ".to_owned()]));
     assert!(bytes > 0 && store.contains(0, UVec3::ZERO).unwrap());
+}
+
+/// Chunks of a store that is gone are no chunks that it never held.
+#[test]
+fn stores_that_are_removed_are_errors() {
+    let folder = Folder::new();
+    let store = folder.0.path().join("a.zarr");
+    let metadata = serde_json::json!({
+        "zarr_format": 3, "node_type": "array", "shape": [4, 4, 4], "data_type": "uint8", "fill_value": 7,
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [2, 2, 2]}},
+        "chunk_key_encoding": {"name": "default"}, "codecs": [{"name": "bytes"}],
+    });
+    fs::create_dir_all(store.join("c/0/0")).unwrap();
+    fs::write(store.join("zarr.json"), metadata.to_string()).unwrap();
+    fs::write(store.join("c/0/0/0"), [1; 8]).unwrap();
+    let server = Server::new(folder.0.path().to_owned());
+    let address = format!("{}/files/a.zarr", server.address);
+    let opened = open_store(Path::new(&address), &ReadOptions::default()).unwrap();
+    let read = |from: UVec3| {
+        let mut value = [0.0];
+        opened.read(0, from, UVec3::ONE, &mut value).map(|_| value[0])
+    };
+    assert_eq!([UVec3::ZERO, UVec3::splat(2)].map(|from| read(from).unwrap()), [1.0, 7.0]);
+    assert!(!opened.contains(0, UVec3::X).unwrap());
+    fs::remove_dir_all(&store).unwrap();
+    let errors = [read(UVec3::ZERO).unwrap_err(), opened.contains(0, UVec3::Y).unwrap_err()];
+    for message in errors.map(|error| error.to_string()) {
+        assert!(message.contains("a.zarr/zarr.json: ") && message.contains("not found"), "{message}");
+    }
 }
 
 #[test]
