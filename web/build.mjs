@@ -2,7 +2,7 @@
 //   node build.mjs
 // Needs Rust's target wasm32-unknown-unknown and the wasm-bindgen of Cargo.lock's version, which `.ci/setup --web` installs.
 import { execFileSync } from "node:child_process";
-import { existsSync, mkdirSync, readFileSync, renameSync, rmSync, writeFileSync } from "node:fs";
+import { copyFileSync, existsSync, mkdirSync, readFileSync, renameSync, rmSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 import { gzipSync } from "node:zlib";
@@ -33,8 +33,52 @@ if (found !== version) {
     throw new Error(`${bindgen}: found version ${found}, allowed: ${version}, that of Cargo.lock, which .ci/setup --web installs`);
 }
 
+/** A number of a WebAssembly file from some place on (unsigned LEB128), and the place after it. */
+function readNumber(bytes, at) {
+    let [number, shift] = [0, 0];
+    do {
+        number += (bytes[at] & 0x7f) * 2 ** shift;
+        shift += 7;
+    } while (bytes[at++] & 0x80);
+    return [number, at];
+}
+
+function writeNumber(number) {
+    const bytes = [];
+    for (; number > 0x7f; number >>>= 7) bytes.push((number & 0x7f) | 0x80);
+    return Buffer.from([...bytes, number]);
+}
+
+/** Takes the hashes out of the bindings' names, which do not compress, in a WebAssembly file and in its script. */
+function shortenNames(wasm, script) {
+    const IMPORTS = 2;
+    const [bytes, names] = [readFileSync(wasm), new Map()];
+    // A name stands behind its length, and after the file's head sections stand behind theirs.
+    const shorten = (whole, length, name, plain) => {
+        if (length.charCodeAt(0) !== name.length) throw new Error(`${wasm}: the import ${name} does not stand behind its length`);
+        const others = [...names.values()].filter((other) => other.replace(/\.\d+$/, "") === plain).length;
+        if (!names.has(name)) names.set(name, others ? `${plain}.${others}` : plain);
+        const short = names.get(name);
+        return String.fromCharCode(short.length) + short;
+    };
+    const parts = [bytes.subarray(0, 8)];
+    for (let at = 8; at < bytes.length;) {
+        const [size, start] = readNumber(bytes, at + 1);
+        let section = bytes.subarray(start, start + size);
+        if (bytes[at] === IMPORTS) {
+            section = Buffer.from(section.toString("latin1").replace(/([^])((__wb\w+)_[0-9a-f]{16})(?!\w)/g, shorten), "latin1");
+        }
+        parts.push(bytes.subarray(at, at + 1), writeNumber(section.length), section);
+        at = start + size;
+    }
+    writeFileSync(wasm, Buffer.concat(parts));
+    const text = readFileSync(script, "utf8").replace(/\b__wb\w+_[0-9a-f]{16}\b/g, (name) => JSON.stringify(names.get(name) ?? name));
+    writeFileSync(script, text);
+}
+
 rmSync(dist, { recursive: true, force: true });
 mkdirSync(dist);
+for (const license of ["LICENSE-MIT", "LICENSE-APACHE"]) copyFileSync(join(root, license), join(here, license));
 // A page loads one of both. Only the CPU's speed depends on its code, which vectors make fast; the GPU's may be as short as can be.
 for (const [backend, level] of [["cpu", "s"], ["gpu", "z"]]) {
     const cargo = ["build", "--locked", "-p", "sheetsplat-web", "--features", backend, "--target", "wasm32-unknown-unknown", "--profile", "web"];
@@ -43,6 +87,7 @@ for (const [backend, level] of [["cpu", "s"], ["gpu", "z"]]) {
     const built = join(target, "wasm32-unknown-unknown", "web", "sheetsplat_web.wasm");
     const options = ["--target", "web", "--omit-default-module-path", "--remove-name-section", "--remove-producers-section"];
     run(bindgen, [built, ...options, "--out-dir", dist, "--out-name", backend]);
+    shortenNames(join(dist, `${backend}_bg.wasm`), join(dist, `${backend}.js`));
     const bytes = readFileSync(join(dist, `${backend}_bg.wasm`));
     const zipped = gzipSync(bytes, { level: 9 }).length;
     console.log(`${backend}: ${(bytes.length / 1e6).toFixed(2)} MB, ${(zipped / 1e6).toFixed(2)} MB gzipped`);

@@ -1,8 +1,10 @@
 // The page: files and settings in, pictures out. What the user changes are overrides of a scene, by the keys of scene files.
-import { SheetSplat } from "../dist/index.js";
+import { SheetSplat, marks } from "../dist/index.js";
 import { Clip } from "./clip.js";
 import { chosen, dropped, save } from "./files.js";
+import { Window, showSides } from "./looks.js";
 import { Plot, short } from "./plot.js";
+import { askForm, isBare } from "./raw.js";
 
 const at = (id) => document.getElementById(id);
 const query = new URLSearchParams(location.search);
@@ -146,6 +148,7 @@ function begin() {
     at("settings").disabled = false;
     at("hint").hidden = true;
     at("picked").textContent = "";
+    showSides(facts, view);
     document.activeElement?.closest?.("#plot") && document.activeElement.blur();
     show();
 }
@@ -174,11 +177,13 @@ function channelOf({ name }, number) {
 
 /** Loads files, or what `files.js` makes of folders. */
 async function load(files) {
-    if (files.length === 0) return;
+    const form = isBare(files) ? await askForm(files[0]) : {};
+    if (files.length === 0 || !form) return;
     await working(async () => {
         const scene = files.find((file) => /\.toml$/i.test(file.name));
-        const text = scene ? await (scene.data ?? scene).text() : "";
-        const loaded = await view.loadFile(files);
+        const text = scene ? await (scene.data ?? scene).text() : form;
+        at("warnings").replaceChildren();
+        const loaded = await view.loadFile(files, scene ? {} : { scene: form });
         [facts, base] = [loaded, text];
         name = files.length === 1 ? files[0].name : `${files.length} files`;
         at("example").value = "";
@@ -189,6 +194,7 @@ async function load(files) {
 async function example(builtin) {
     await working(async () => {
         const text = `volume.builtin = ${JSON.stringify(builtin)}\n`;
+        at("warnings").replaceChildren();
         facts = await view.setScene(text);
         [base, name] = [text, builtin.split(":")[0]];
         at("example").value = builtin;
@@ -272,6 +278,16 @@ function listenForSettings() {
 function listenForTheRest() {
     view.on("frame", showStats);
     view.on("error", complain);
+    const range = new Window();
+    view.on("window", (dragged) => facts && change(range.settings(dragged, facts.channels[channel], of)));
+    let end = marks(view);
+    at("marks").addEventListener("change", () => {
+        end();
+        end = at("marks").checked ? marks(view) : () => {};
+    });
+    view.on("warning", (message) => {
+        at("warnings").append(Object.assign(document.createElement("li"), { textContent: message }));
+    });
     view.on("move", () => {
         at("picked").textContent = "";
     });

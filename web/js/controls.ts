@@ -9,8 +9,18 @@ const ZOOM = 1.15;
 const WHEEL = 0.0015;
 const PINCH = 0.01;
 
-/** Lets a canvas move a camera; `move` gets what is done, and whether more will follow at once. Returns what ends it. */
-export function control(canvas: HTMLCanvasElement, move: (move: Move, isGoingOn: boolean) => void): () => void {
+/** How far the right button has dragged, in heights of the picture, and whether it still does. */
+type Dragged = { right: number; down: number; isGoingOn: boolean };
+
+/**
+ * Lets a canvas move a camera; `move` gets what is done, and whether more will follow at once. What the right button drags does not move it, and goes to
+ * `dragged`. Returns what ends it.
+ */
+export function control(
+    canvas: HTMLCanvasElement,
+    move: (move: Move, isGoingOn: boolean) => void,
+    dragged: (by: Dragged) => void,
+): () => void {
     const ending = new AbortController();
     const listen = <K extends keyof HTMLElementEventMap>(name: K, then: (event: HTMLElementEventMap[K]) => void) => {
         canvas.addEventListener(name, then, { signal: ending.signal, passive: false });
@@ -46,19 +56,32 @@ export function control(canvas: HTMLCanvasElement, move: (move: Move, isGoingOn:
         if (by[0] !== 0 || by[1] !== 0) move(pans ? { pan: by } : { orbit: by }, true);
         if (apart > 0 && newApart > 0 && apart !== newApart) move({ zoom: apart / newApart }, true);
     };
+    /** Where the right button went down. */
+    let origin: [number, number] | undefined;
+    const drag = ({ clientX, clientY }: PointerEvent, isGoingOn: boolean) => {
+        if (origin) dragged({ right: (clientX - origin[0]) / height(), down: (clientY - origin[1]) / height(), isGoingOn });
+    };
     listen("pointerdown", (event) => {
+        if (event.button === 2 && down.size === 0) {
+            canvas.setPointerCapture(event.pointerId);
+            origin = [event.clientX, event.clientY];
+            return;
+        }
         follow();
         canvas.setPointerCapture(event.pointerId);
         down.set(event.pointerId, [event.clientX, event.clientY]);
         held = grip();
     });
     listen("pointermove", (event) => {
+        drag(event, true);
         if (!down.has(event.pointerId)) return;
         down.set(event.pointerId, [event.clientX, event.clientY]);
         pans = down.size === 2 || event.shiftKey || (event.buttons & 1) === 0;
         frame ||= requestAnimationFrame(follow);
     });
     const up = (event: PointerEvent) => {
+        drag(event, false);
+        origin = undefined;
         if (!down.has(event.pointerId)) return;
         follow();
         down.delete(event.pointerId);

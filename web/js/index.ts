@@ -9,6 +9,7 @@ import { Remote, type Backend, type Camera, type Facts, type Given, type Move, t
 import { overrides, removed, sceneText, type SceneObject, type SceneValue } from "./scene.js";
 
 export type { Backend, Camera, Channel, Facts, Given, Move, Pick, Pixels, Stats } from "./protocol.js";
+export { marks, type Mark } from "./marks.js";
 export type { SceneObject, SceneValue } from "./scene.js";
 
 /** A file: dropped or chosen, its bytes, where it lies, or its data with a name, which may be a path. */
@@ -62,8 +63,12 @@ export interface SheetSplatEvents {
     lost: string;
     /** It draws again: by another device, or by the CPU if the backend is `"auto"` and there is no other device. */
     restored: string;
+    /** What a reader assumes, or something else that makes the picture another one than might be expected, once for each volume. */
+    warning: string;
     /** The camera moved. */
     move: undefined;
+    /** The right button dragged, by heights of the picture since it went down, and whether it still is: a page may change window and level by it. */
+    window: { right: number; down: number; isGoingOn: boolean };
 }
 
 /** A view of a volume on a canvas. */
@@ -76,7 +81,9 @@ export class SheetSplat extends EventTarget {
     /** Ends what listens to the canvas. */
     #endings: (() => void)[] = [];
     #source: string | undefined;
-    #hasVolume = false;
+    #facts: Facts | undefined;
+    /** The warnings that the volume has had. */
+    #warnings = new Set<string>();
     #moves: Move[] = [];
     #isGoingOn = false;
     #wanted: Promise<Stats> | undefined;
@@ -129,14 +136,20 @@ export class SheetSplat extends EventTarget {
         return this.#canvas;
     }
 
+    /** The volume, and how its scene shows it; `undefined` before the first one. */
+    get facts(): Facts | undefined {
+        return this.#facts;
+    }
+
     /** Listens to the canvas. */
     #attach(): void {
         const canvas = this.#canvas;
         if (this.#hasControls) {
-            this.#endings.push(control(canvas, (move, isGoingOn) => {
+            const moved = (move: Move, isGoingOn: boolean) => {
                 this.#isGoingOn = isGoingOn;
                 this.move(move);
-            }));
+            };
+            this.#endings.push(control(canvas, moved, (dragged) => this.#emit("window", dragged)));
         }
         if (this.#fits) {
             let last = onScreen(canvas).join();
@@ -157,7 +170,10 @@ export class SheetSplat extends EventTarget {
             this.#emit("error", new Error(message));
         } else if (event === "canvas") {
             this.#replaceCanvas();
+        } else if (event === "warning" && this.#warnings.has(message)) {
+            return;
         } else {
+            if (event === "warning") this.#warnings.add(message);
             this.#emit(event, message);
             if (event === "restored") this.#refresh();
         }
@@ -197,10 +213,11 @@ export class SheetSplat extends EventTarget {
 
     async #show(text: string, options: SceneOptions, source: string | undefined, given: Given[] | undefined): Promise<Facts> {
         const set = options.set ?? {};
+        if (given) this.#warnings.clear();
         const shown = { text, unset: removed(set), sets: overrides(set), source, keepCamera: options.keepCamera ?? false };
         const facts = await this.#remote.call("setScene", [shown, given]);
         if (given) this.#source = source;
-        this.#hasVolume = true;
+        this.#facts = facts;
         this.#emit("load", facts);
         await this.render();
         return facts;
@@ -240,7 +257,7 @@ export class SheetSplat extends EventTarget {
     }
 
     /** Moves the camera: turned (`orbit`) or moved (`pan`) as by a pointer that moves right and down by some heights of the picture, the height of
-     * what is shown multiplied (`zoom`), or back to the scene's (`home`). Draws it. */
+     * what is shown multiplied (`zoom`), in another direction with an up vector (`look`), or back to the scene's (`home`). Draws it. */
     move(move: Move): void {
         this.#moves.push(move);
         this.#emit("move", undefined);
@@ -248,14 +265,14 @@ export class SheetSplat extends EventTarget {
     }
 
     #refresh(): void {
-        if (!this.#hasVolume) return;
+        if (!this.#facts) return;
         this.render().catch((error) => this.#emit("error", error));
     }
 
     /** Changes the picture's size in pixels, and draws it. With the option `fit` it follows the canvas by itself. */
     async resize(width: number, height: number): Promise<void> {
         await this.#remote.call("resize", [width, height]);
-        if (this.#hasVolume) await this.render();
+        if (this.#facts) await this.render();
     }
 
     /** The point that the picture shows at a pixel, counted from the upper left; `undefined` where it is transparent. */
@@ -291,7 +308,7 @@ export class SheetSplat extends EventTarget {
     /** Ends the workers, which frees their memory. */
     dispose(): void {
         for (const end of this.#endings.splice(0)) end();
-        this.#hasVolume = false;
+        this.#facts = undefined;
         this.#remote.end();
     }
 

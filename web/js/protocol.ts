@@ -54,6 +54,8 @@ export interface Facts {
     /** The number of voxels without a value. */
     holes: number;
     labels: boolean;
+    /** The directions of x, y and z in a patient's RAS; `null` for files that state no patient. */
+    orientation: [[number, number, number], [number, number, number], [number, number, number]] | null;
     /** The preset that fits the values, if they tell. */
     suggested: string | null;
     /** The presets that suit the volume. */
@@ -119,6 +121,7 @@ export type Move =
     | { orbit: [right: number, down: number] }
     | { pan: [right: number, down: number] }
     | { zoom: number }
+    | { look: [direction: [number, number, number], up: [number, number, number]] }
     | { home: true };
 
 /** What a worker shows. */
@@ -192,8 +195,8 @@ export type Answer =
     | { id: number; error: string }
     | { event: News; message: string };
 
-/** A worker's news: the device is lost, another canvas is needed so that the CPU can draw, it draws again, or all that failed. */
-export type News = "lost" | "canvas" | "restored" | "failed";
+/** A worker's news: the device is lost, another canvas is needed so that the CPU can draw, it draws again, or all that failed; or a warning. */
+export type News = "lost" | "canvas" | "restored" | "failed" | "warning";
 
 /** Calls to a worker, as promises. */
 export class Remote {

@@ -18,6 +18,8 @@ interface Scope {
     postMessage(message: Answer, moved: Transferable[]): void;
     onmessage: (event: MessageEvent<Call>) => void;
     sheetsplatPanic?: string;
+    /** Tells of the library's warnings. */
+    sheetsplatWarn: (message: string) => void;
     sheetsplatLost?: (message: string) => void;
 }
 
@@ -27,6 +29,10 @@ interface GpuAccess {
 }
 
 const scope = self as unknown as Scope;
+// Those that help have the same volume, and the same warnings.
+scope.sheetsplatWarn = (message) => {
+    if (start.canvas) scope.postMessage({ event: "warning", message }, []);
+};
 
 let start: Start;
 /** The library that draws; a page loads one of both. */
@@ -104,6 +110,7 @@ const calls: { [K in Exclude<keyof Calls, "giveCanvas">]: (...args: Parameters<C
             if ("orbit" in move) session.orbit(...move.orbit);
             else if ("pan" in move) session.pan(...move.pan);
             else if ("zoom" in move) session.zoom(move.zoom);
+            else if ("look" in move) session.look(Float64Array.from(move.look.flat()));
             else session.home();
         }
         await others;
@@ -221,7 +228,10 @@ function ofCpu(): Cpu.Session {
 }
 
 function broadcast<K extends keyof Calls>(name: K, args: Parameters<Calls[K]>): Promise<unknown> {
-    return Promise.all(helpers.map((helper) => helper.call(name, args)));
+    const all = Promise.all(helpers.map((helper) => helper.call(name, args)));
+    // A helper may fail before its caller waits for it.
+    all.catch(() => {});
+    return all;
 }
 
 /** The picture's size with every `coarse`-th pixel. */

@@ -20,6 +20,8 @@ pub(crate) struct Facts<'a> {
     format: Option<&'static str>,
     holes: f64,
     labels: bool,
+    /// The directions of x, y and z in a patient's RAS.
+    orientation: Option<[[f64; 3]; 3]>,
     /// The preset that fits the values, if they tell.
     suggested: Option<&'static str>,
     presets: Vec<&'static str>,
@@ -81,6 +83,7 @@ impl<'a> Facts<'a> {
             format: volume.encoding().map(|encoding| encoding.format),
             holes: volume.holes() as f64,
             labels: volume.labels().is_some(),
+            orientation: volume.orientation().map(|orientation| orientation.axes.to_cols_array_2d()),
             suggested: Preset::suggested(volume).and_then(|preset| name_of(&Preset::ALL, preset)),
             presets: Preset::ALL.iter().filter(|(_, preset)| preset.suits(volume)).map(|(name, _)| *name).collect(),
             colormaps: Colormap::ALL.iter().map(|(name, _)| *name).collect(),

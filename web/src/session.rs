@@ -5,9 +5,9 @@ use std::path::Path;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use glam::DVec2;
 #[cfg(not(feature = "gpu"))]
 use glam::DVec4;
+use glam::{DVec2, DVec3};
 #[cfg(feature = "gpu")]
 use js_sys::{Array, Float64Array};
 use js_sys::{Map, Uint8Array};
@@ -112,6 +112,16 @@ impl Session {
         if let Some(shown) = &mut self.shown {
             navigation::orbit(&mut shown.scene.camera, DVec2::new(right, down) * TURN);
         }
+    }
+
+    /// Looks at the same centre in another direction: six numbers, the direction and the vector that is up.
+    pub fn look(&mut self, vectors: &[f64]) -> Result<(), JsValue> {
+        let Some(shown) = &mut self.shown else { return Ok(()) };
+        let &[a, b, c, x, y, z] = vectors else { return Err(error("look: found fewer or more than two vectors")) };
+        let camera = shown.scene.camera.looking([DVec3::new(a, b, c), DVec3::new(x, y, z)]);
+        camera.check().map_err(error)?;
+        shown.scene.camera = camera;
+        Ok(())
     }
 
     /// Multiplies the height of what the picture shows.

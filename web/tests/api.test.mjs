@@ -73,6 +73,30 @@ test("settings replace those of a scene, and null takes them out", async () => {
     assert.notEqual(found.stated[0], found.plain[0]);
 });
 
+test("what a reader assumes is told once for each volume", async () => {
+    const { page: shown } = await api(opened);
+    const bytes = fixture("sheared.nii").toString("base64");
+    const found = await shown.evaluate(async (bytes) => {
+        const view = await window.make([40, 30], { backend: "cpu", workers: 2 });
+        const warnings = [];
+        const end = view.on("warning", (message) => warnings.push(message));
+        const data = Uint8Array.from(atob(bytes), (letter) => letter.charCodeAt(0)).buffer;
+        const load = async () => {
+            await view.loadFile(data, { name: "sheared.nii" });
+            await view.setScene({ volume: { spacing: [1, 1, 2] } });
+            return warnings.splice(0);
+        };
+        const told = [await load(), await load()];
+        end();
+        return [...told, await load()];
+    }, bytes);
+    for (const warnings of found.slice(0, 2)) {
+        assert.equal(warnings.length, 1, warnings.join("; "));
+        assert.match(warnings[0], /^sheared\.nii: .*shear/);
+    }
+    assert.deepEqual(found[2], []);
+});
+
 test("files are loaded from addresses, as bytes and by names", async () => {
     const { page: shown } = await api(opened);
     await shown.route("**/data/*", (route) => route.fulfill({ path: join(fixtures, decodeURIComponent(new URL(route.request().url()).pathname.split("/").pop())) }));
@@ -207,5 +231,7 @@ test("the ten lines of the guide do what it says", async () => {
     const head = await isDrawn();
     await shown.setInputFiles("#file", { name: "nifti.nii", mimeType: "", buffer: fixture("sform.nii") });
     await isDrawn(head);
+    await shown.setInputFiles("#file", { name: "letter.txt", mimeType: "", buffer: Buffer.from("Dear Sir") });
+    await shown.waitForFunction(() => document.getElementById("problem").value.startsWith("letter.txt: format: "));
     assert.deepEqual(faults, []);
 });

@@ -1,5 +1,6 @@
 // The package in an application that vite bundles or serves, as the guide tells.
 import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
 import { cpSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
@@ -85,4 +86,10 @@ test("the package's files can be named by those who copy them", () => {
     for (const name of ["cpu_bg.wasm", "gpu_bg.wasm", "worker.js", "package.json"]) {
         assert.ok(readFileSync(require.resolve(`sheetsplat/${name}`)).length > 100, name);
     }
+});
+
+test("the package holds its README, its licences and nothing but the build", () => {
+    const [{ files }] = JSON.parse(execFileSync("npm", ["pack", "--dry-run", "--json"], { cwd: web, encoding: "utf8" }));
+    const names = files.map(({ path }) => path).filter((path) => !path.startsWith("dist/"));
+    assert.deepEqual(names.sort(), ["LICENSE-APACHE", "LICENSE-MIT", "README.md", "package.json"]);
 });

@@ -76,17 +76,44 @@ test("a drag turns", async () => {
     assert.deepEqual(faults, []);
 });
 
-test("a drag with Shift or with another button moves", async () => {
+test("a drag with Shift or with the middle button moves", async () => {
     await shown.keyboard.down("Shift");
     await drag([24, -9]);
     await shown.keyboard.up("Shift");
     await pannedBy(24, -9);
-    for (const button of ["right", "middle"]) {
-        start = await camera(shown);
-        await drag([-15, 6], { button });
-        await pannedBy(-15, 6);
-    }
+    start = await camera(shown);
+    await drag([-15, 6], { button: "middle" });
+    await pannedBy(-15, 6);
     assert.deepEqual(faults, []);
+});
+
+test("a drag with the right button is the page's, and moves nothing", async () => {
+    await shown.evaluate(() => {
+        window.drags = [];
+        window.view.on("window", (dragged) => window.drags.push(dragged));
+    });
+    await drag([30, -12], { button: "right" });
+    const drags = await shown.evaluate(() => window.drags);
+    assert.deepEqual(drags.at(-1), { right: 30 / HEIGHT, down: -12 / HEIGHT, isGoingOn: false });
+    assert.ok(drags.length > 1 && drags.slice(0, -1).every(({ isGoingOn }) => isGoingOn));
+    assert.deepEqual(await camera(shown), start);
+    await drag([30, 0]);
+    await turnedBy(30 / HEIGHT);
+    assert.equal((await shown.evaluate(() => window.drags)).length, drags.length);
+    assert.deepEqual(faults, []);
+});
+
+test("a look keeps the centre and the height, and vectors that no camera has are errors", async () => {
+    const look = (...vectors) => shown.evaluate(async (look) => {
+        window.view.move({ look });
+        return await window.view.render().then(() => "", (error) => error.message);
+    }, vectors);
+    assert.equal(await look([0, 0, -2], [0, 1, 0]), "");
+    const { direction, up, center, height } = await camera(shown);
+    assert.deepEqual([direction, up, height], [[0, 0, -1], [0, 1, 0], start.height]);
+    minus(center, start.center).forEach((component) => near(component, 0, "centre"));
+    assert.match(await look([0, 0, 1], [0, 0, 1]), /^camera\.up: /);
+    assert.deepEqual((await camera(shown)).direction, direction);
 });
 
 test("the wheel zooms, and the pinch of a touchpad more", async () => {

@@ -29,6 +29,9 @@ for (const [backend, size] of [["cpu", SMALL], ["gpu", TINY]]) {
             assert.match(await text(shown, "#volume"), words);
             assert.ok(await colors(shown) > 1, `${name} shows nothing`);
         }
+        assert.equal(await text(shown, "#warnings"), "");
+        await drop(shown, [{ name: "sheared.nii" }]);
+        assert.match(await text(shown, "#warnings"), /^sheared\.nii: /);
         assert.match(await text(shown, "#stats"), backend === "gpu" ? /WebGPU/ : /CPU, 2 workers, simd128/);
         assert.deepEqual(faults, []);
     });
