@@ -1,5 +1,5 @@
-//! The number of cases that a test draws. Where every combination of settings would take minutes, most of all to compile pipelines, `.ci/run` draws
-//! some, and `.ci/run --all` draws all: it sets `SHEETSPLAT_EVERY_CASE`.
+//! The number of cases that a test draws. Where every combination of settings would take minutes, most of all to compile pipelines, tests draw
+//! some, and with `SHEETSPLAT_EVERY_CASE` all. `.ci/run --all` sets it for random scenes.
 
 use std::sync::LazyLock;
 

@@ -408,3 +408,18 @@ fn surfaces_of_a_single_value_against_the_twin() {
         assert!(psnr > required(&scene), "{value}: {psnr} dB");
     }
 }
+
+/// Among values that are equal over whole regions, rounding must not choose another point, whose light is another.
+#[test]
+fn extremes_of_plateaus_are_the_twins() {
+    let mut random = Random(4711);
+    let mut worst = f64::INFINITY;
+    for case in 0..40 {
+        let (mut volume, mut scene) = random_after(&mut random);
+        scene.splatting.compositing = [Compositing::Maximum, Compositing::Minimum][case % 2];
+        let values = volume.values().iter().map(|value| (value / 64.0).floor() * 64.0).collect();
+        volume = Volume::new("plateaus", volume.dims(), volume.spacing(), values).unwrap();
+        worst = worst.min(psnr(&draw(&volume, &scene).image, &twin(&volume, &scene)));
+    }
+    assert!(worst > 80.0, "{worst} dB");
+}
