@@ -129,6 +129,8 @@ pub mod part;
 #[cfg(feature = "gpu")]
 mod pass;
 mod pick;
+#[cfg(feature = "golden")]
+pub mod provenance;
 #[cfg(feature = "gpu")]
 mod rasterizer;
 mod reference;

@@ -10,6 +10,8 @@ pub use sheetsplat_volume::{
 
 #[cfg(all(feature = "gpu", not(target_arch = "wasm32")))]
 pub(crate) use sheetsplat_volume::internals::HollowChannel;
+#[cfg(feature = "golden")]
+pub(crate) use sheetsplat_volume::internals::archive_and_inner;
 pub(crate) use sheetsplat_volume::internals::{
     Access, AdaptedStore, COLOR_BYTES, MEMBERSHIP_REACH, Resampling, SIZES, SPACING, Selection, Thinned, are_sharp,
     check_grids, check_spacing, dims_of, is_address, labels_of, levels, range, raw_store, sample_of_channels, store,

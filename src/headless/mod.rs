@@ -17,7 +17,7 @@ mod joined;
 mod options;
 #[cfg(feature = "gpu")]
 pub mod readback;
-mod reference;
+pub(crate) mod reference;
 mod timed;
 mod view;
 

@@ -4,21 +4,37 @@ use std::io::Cursor;
 
 use ::exr::error::Error;
 use ::exr::meta::MetaData;
+use ::exr::meta::attribute::{AttributeValue, Text};
 use ::exr::meta::header::Header;
 use ::exr::prelude::{Image as File, ReadChannels, ReadLayers, SpecificChannels, Vec2, WritableImage};
 
 use super::Image;
+use super::described::KEYWORD;
 
-/// The bytes of a file.
-pub(super) fn encode(image: &Image) -> Result<Vec<u8>, Error> {
+/// The bytes of a file with a text, of ASCII alone, that describes it.
+pub(super) fn encode(image: &Image, text: Option<&str>) -> Result<Vec<u8>, Error> {
     let size = (image.width as usize, image.height as usize);
     let pixel = |Vec2(x, y): Vec2<usize>| {
         let [red, green, blue, alpha] = image.pixels[x + y * size.0];
         (red, green, blue, alpha)
     };
+    let mut file = File::from_channels(size, SpecificChannels::rgba(pixel));
+    if let Some(text) = text {
+        let text = Text::new_or_none(text).ok_or(Error::Invalid("text beyond Latin-1".into()))?;
+        file.layer_data.attributes.other.insert(Text::from(KEYWORD), AttributeValue::Text(text));
+    }
     let mut bytes = Cursor::new(Vec::new());
-    File::from_channels(size, SpecificChannels::rgba(pixel)).write().non_parallel().to_buffered(&mut bytes)?;
+    file.write().non_parallel().to_buffered(&mut bytes)?;
     Ok(bytes.into_inner())
+}
+
+/// The text that describes a file.
+pub(super) fn text(bytes: &[u8]) -> Result<Option<String>, Error> {
+    let text = |header: &Header| match header.own_attributes.other.get(KEYWORD.as_bytes()) {
+        Some(AttributeValue::Text(text)) => Some(text.to_string()),
+        _ => None,
+    };
+    Ok(headers(bytes)?.iter().find_map(text))
 }
 
 /// The headers of a file's layers.

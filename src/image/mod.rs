@@ -2,6 +2,8 @@
 
 pub(crate) mod channels;
 #[cfg(feature = "codecs")]
+pub(crate) mod described;
+#[cfg(feature = "codecs")]
 mod exr;
 #[cfg(feature = "codecs")]
 mod format;

@@ -5,6 +5,7 @@ use std::io::Cursor;
 use ::png::{BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, EncodingError, Transformations};
 
 use super::Image;
+use super::described::{KEYWORD, MAX_TEXT};
 
 /// Bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -16,8 +17,8 @@ pub enum PngDepth {
     Sixteen,
 }
 
-/// The bytes of a file with these channels, red, green, blue and alpha for each pixel.
-pub(super) fn encode(image: &Image, depth: PngDepth) -> Result<Vec<u8>, EncodingError> {
+/// The bytes of a file with these channels, red, green, blue and alpha for each pixel, and a text that describes it.
+pub(super) fn encode(image: &Image, depth: PngDepth, text: Option<&str>) -> Result<Vec<u8>, EncodingError> {
     let mut bytes = Vec::new();
     let mut encoder = Encoder::new(&mut bytes, image.width, image.height);
     encoder.set_color(ColorType::Rgba);
@@ -33,10 +34,27 @@ pub(super) fn encode(image: &Image, depth: PngDepth) -> Result<Vec<u8>, Encoding
             image.straight_channels(u16::MAX).flatten().flat_map(u16::to_be_bytes).collect::<Vec<u8>>()
         }
     };
+    if let Some(text) = text {
+        encoder.add_itxt_chunk(KEYWORD.to_owned(), text.to_owned())?;
+    }
     let mut writer = encoder.write_header()?;
     writer.write_image_data(&channels)?;
     writer.finish()?;
     Ok(bytes)
+}
+
+/// The text that describes a file, before its pixels or behind them, where other programs may put it.
+pub(super) fn text(bytes: &[u8]) -> Result<Option<String>, DecodingError> {
+    let mut reader = Decoder::new(Cursor::new(bytes)).read_info()?;
+    let find = |reader: &::png::Reader<Cursor<&[u8]>>| {
+        let mut chunk = reader.info().utf8_text.iter().find(|chunk| chunk.keyword == KEYWORD)?.clone();
+        Some(chunk.decompress_text_with_limit(MAX_TEXT).and_then(|()| chunk.get_text()))
+    };
+    if let Some(text) = find(&reader) {
+        return text.map(Some);
+    }
+    reader.finish()?;
+    find(&reader).transpose()
 }
 
 /// A file whose header has been read.

@@ -30,14 +30,24 @@ impl Image {
     /// # Errors
     /// If the extension is unknown or the image cannot be encoded.
     pub fn encode(&self, path: &Path, depth: PngDepth) -> Result<Vec<u8>, ImageError> {
+        self.encode_described(path, depth, None)
+    }
+
+    /// The bytes of a file with a text that describes it, of ASCII alone, where the format has room for one. The pixels are those of [`Image::encode`].
+    pub(crate) fn encode_described(
+        &self,
+        path: &Path,
+        depth: PngDepth,
+        text: Option<&str>,
+    ) -> Result<Vec<u8>, ImageError> {
         // The encoders trust this.
         if self.pixels.len() as u64 != u64::from(self.width) * u64::from(self.height) {
             let source = "pixels do not fill width × height".into();
             return Err(ImageError::Encode { path: path.to_owned(), source });
         }
         match Format::of(path)? {
-            Format::Png => png::encode(self, depth).map_err(Into::into),
-            Format::Exr => exr::encode(self).map_err(Into::into),
+            Format::Png => png::encode(self, depth, text).map_err(Into::into),
+            Format::Exr => exr::encode(self, text).map_err(Into::into),
             Format::Npy => Ok(self.npy()),
         }
         .map_err(|source| ImageError::Encode { path: path.to_owned(), source })

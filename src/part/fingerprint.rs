@@ -11,6 +11,8 @@ use crate::volume::{StreamedVolume, Thinned, Volume};
 /// The texts that begin what is hashed; another meaning of fingerprints needs another text.
 const DOMAIN: &str = "sheetsplat part 1\n";
 const DOMAIN_OF_MATTER: &str = "sheetsplat light 1\n";
+#[cfg(feature = "golden")]
+const DOMAIN_OF_CHANNEL: &str = "sheetsplat channel 1\n";
 
 /// The fingerprint of a scene of a volume, as hexadecimal digits. It is the same on every machine. Of a volume that is streamed it has the identities of its
 /// stores in place of the values.
@@ -42,16 +44,7 @@ pub(crate) fn of_matter(volume: &OpenVolume, explicit: &Scene) -> Result<String,
 fn of_settings(domain: &str, (volume, is_lit): (&OpenVolume, bool), explicit: Scene) -> Result<String, SceneError> {
     let mut hash = blake3::Hasher::new();
     hash.update(domain.as_bytes()).update(settings(explicit)?.as_bytes());
-    let grid = volume.grid();
-    for (count, spacing) in grid.dims.to_array().into_iter().zip(grid.spacing.to_array()) {
-        hash.update(&count.to_le_bytes()).update(&spacing.to_le_bytes());
-    }
-    if volume.level() > 0 {
-        // A level lies where the finest one does, and has its unit.
-        for number in [grid.unit()].into_iter().chain(grid.place().to_array()) {
-            hash.update(&number.to_le_bytes());
-        }
-    }
+    add_grid(&mut hash, volume);
     match volume {
         OpenVolume::Whole(volume) => add_values(&mut hash, volume),
         OpenVolume::Streamed(volume) => {
@@ -63,6 +56,38 @@ fn of_settings(domain: &str, (volume, is_lit): (&OpenVolume, bool), explicit: Sc
         }
     }
     Ok(hash.finalize().to_hex().to_string())
+}
+
+/// The hash of each channel of a volume, as hexadecimal digits: of its grid, values, labels and colours, or if it is streamed, of the identities of its
+/// stores.
+#[cfg(feature = "golden")]
+pub(crate) fn of_channels(volume: &OpenVolume) -> Vec<String> {
+    let of_channel = |number: usize| {
+        let channel = volume.of_channel(number);
+        let mut hash = blake3::Hasher::new();
+        hash.update(DOMAIN_OF_CHANNEL.as_bytes());
+        add_grid(&mut hash, &channel);
+        match &channel {
+            OpenVolume::Whole(volume) => add_values(&mut hash, volume),
+            OpenVolume::Streamed(volume) => add_identities(&mut hash, volume),
+        }
+        hash.finalize().to_hex().to_string()
+    };
+    (0..volume.sample().channel_count()).map(of_channel).collect()
+}
+
+/// Hashes the size and the place of a volume's voxels.
+fn add_grid(hash: &mut blake3::Hasher, volume: &OpenVolume) {
+    let grid = volume.grid();
+    for (count, spacing) in grid.dims.to_array().into_iter().zip(grid.spacing.to_array()) {
+        hash.update(&count.to_le_bytes()).update(&spacing.to_le_bytes());
+    }
+    if volume.level() > 0 {
+        // A level lies where the finest one does, and has its unit.
+        for number in [grid.unit()].into_iter().chain(grid.place().to_array()) {
+            hash.update(&number.to_le_bytes());
+        }
+    }
 }
 
 /// Hashes what identifies the stores of channels and labels: digits, each but the first behind a word that says what it is of.

@@ -124,7 +124,7 @@ impl Image {
 }
 
 /// The pixels of an image of merged slabs.
-fn resolved(contents: Channels<Content>, identity: &Identity) -> Vec<[f32; 4]> {
+pub(crate) fn resolved(contents: Channels<Content>, identity: &Identity) -> Vec<[f32; 4]> {
     let Identity { classification, background, means, .. } = identity;
     let are_joined = contents.len() > 1;
     let behind = if are_joined { [0.0; 4] } else { *background };

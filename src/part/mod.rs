@@ -51,6 +51,8 @@ pub use identity::{Identity, Part};
 pub use mean::MeanTables;
 pub(crate) use mean::note_labels;
 pub use merge::MergeError;
+#[cfg(feature = "golden")]
+pub(crate) use merge::resolved;
 #[cfg(feature = "codecs")]
 pub(crate) use npz::archive;
 #[cfg(feature = "cpu")]

@@ -19,7 +19,7 @@ mod reader;
 mod source;
 mod tables;
 mod transfer_settings;
-mod writer;
+pub(crate) mod writer;
 
 use std::path::Path;
 use std::sync::Arc;

@@ -32,6 +32,11 @@ impl Scene {
     /// # Errors
     /// If the path of the volume or of its labels is not UTF-8, or the offset in a raw file exceeds TOML's integers.
     pub fn to_toml(&self, folder: &Path) -> Result<String, SceneError> {
+        self.to_toml_naming(&|path, key| within(folder, path, key))
+    }
+
+    /// [`Self::to_toml`] with other names of files, each given by its path and the key that it is written for.
+    pub(crate) fn to_toml_naming(&self, name_of_file: &NameOfFile<'_>) -> Result<String, SceneError> {
         let Self { channels, camera, image, clip, shading, splatting, fitting } = self;
         let Channel { name, visible, transfer, .. } = channels.first();
         let mut text = Text::default();
@@ -42,7 +47,7 @@ impl Scene {
         let is_one = channels.len() == 1 && name.is_none() && *visible;
         for (number, channel) in channels.iter().enumerate() {
             text.channel = (!is_one).then_some(number);
-            write_channel(&mut text, folder, channel)?;
+            write_channel(&mut text, name_of_file, channel)?;
         }
         text.channel = None;
         // Without these tables the camera is this one again (SPEC §2).
@@ -62,6 +67,9 @@ impl Scene {
     }
 }
 
+/// The name that is written for a file's path, given the key.
+type NameOfFile<'a> = dyn Fn(&Path, &str) -> Result<String, SceneError> + 'a;
+
 /// Lines of TOML.
 #[derive(Default)]
 struct Text {
@@ -70,7 +78,7 @@ struct Text {
     channel: Option<usize>,
 }
 
-fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<(), SceneError> {
+fn write_channel(text: &mut Text, name_of_file: &NameOfFile<'_>, channel: &Channel) -> Result<(), SceneError> {
     let Channel { name, visible, volume, spacing, labels, label_table, index, time, level, series, transfer } = channel;
     if text.channel.is_some() {
         let _ = writeln!(text.text, "\n[[channel]]");
@@ -89,10 +97,10 @@ fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<()
         text.table("volume");
     }
     match volume {
-        VolumeSource::File(path) => text.line("path", within(folder, path, &of_path)?),
+        VolumeSource::File(path) => text.line("path", name_of_file(path, &of_path)?),
         VolumeSource::Raw(path, layout) => {
             let RawLayout { dims, sample_type, big_endian, offset } = *layout;
-            text.line("path", within(folder, path, &of_path)?);
+            text.line("path", name_of_file(path, &of_path)?);
             text.line("dims", dims.to_array().map(i64::from).map(Value::from).to_vec());
             text.line("type", sample_type.to_string());
             text.line("endian", if big_endian { "big" } else { "little" });
@@ -104,11 +112,11 @@ fn write_channel(text: &mut Text, folder: &Path, channel: &Channel) -> Result<()
         VolumeSource::Memory => {}
     }
     text.given("spacing", spacing.map(vector));
-    let labels = labels.as_ref().map(|path| within(folder, path, &of_labels));
+    let labels = labels.as_ref().map(|path| name_of_file(path, &of_labels));
     text.given("labels", labels.transpose()?);
     let table = label_table.as_ref().map(|path| match path.to_str() {
         Some(name) if name.starts_with("builtin:") => Ok(name.to_owned()),
-        _ => within(folder, path, &of_table),
+        _ => name_of_file(path, &of_table),
     });
     text.given("label_table", table.transpose()?);
     text.given("index", index.map(i64::from));
@@ -341,7 +349,7 @@ fn within(folder: &Path, path: &Path, key: &str) -> Result<String, SceneError> {
 }
 
 /// The error for a value that cannot be written.
-fn invalid(key: &str, found: String, allowed: &str) -> SceneError {
+pub(crate) fn invalid(key: &str, found: String, allowed: &str) -> SceneError {
     SceneError::Invalid { origin: "scene".to_owned(), key: key.to_owned(), found, allowed: allowed.into() }
 }
 

@@ -24,6 +24,7 @@ mod orbit;
 mod outputs;
 mod parts;
 mod program;
+mod provenance;
 mod rasterizers;
 #[path = "../common/http.rs"]
 mod server;

@@ -15,7 +15,7 @@ pub fn written_in(folder: &Path, path: &str) -> PathBuf {
 }
 
 /// The parts of a path such as `file.npz:name` before and after the colon, for archives of several volumes; any other path is the first part.
-pub(super) fn archive_and_inner(path: &Path) -> (&Path, Option<&str>) {
+pub fn archive_and_inner(path: &Path) -> (&Path, Option<&str>) {
     const EXTENSIONS: [&str; 3] = [".npz:", ".zip:", ".ozx:"];
     let split = path.to_str().filter(|_| !path.exists()).and_then(|text| {
         let lower = text.to_ascii_lowercase();

@@ -18,6 +18,7 @@ use super::outputs::Outputs;
 /// let inputs = Inputs::default();
 /// let volume = Volume::open_with(&path, &ReadOptions::default().noted_in(&inputs))?;
 /// assert!(inputs.check(&Outputs::new([&path])).is_err());
+/// assert_eq!((inputs.files(), inputs.folders()), (vec![path], vec![]));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 #[derive(Clone, Debug, Default)]
@@ -47,6 +48,26 @@ impl Inputs {
         }
         let absolute = path::absolute(named).unwrap_or_else(|_| named.to_owned());
         all.push(Input { named: named.to_owned(), absolute, is_folder });
+    }
+
+    /// The files, in the order in which they were opened, each once, wherever the program's working folder is now.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.paths(false)
+    }
+
+    /// The folders of Zarr stores, as for [`Self::files`].
+    pub fn folders(&self) -> Vec<PathBuf> {
+        self.paths(true)
+    }
+
+    fn paths(&self, of_folders: bool) -> Vec<PathBuf> {
+        let mut paths = Vec::new();
+        for Input { absolute, .. } in self.all().iter().filter(|input| input.is_folder == of_folders) {
+            if !paths.contains(absolute) {
+                paths.push(absolute.clone());
+            }
+        }
+        paths
     }
 
     /// Checks that none of them is a file that will be written.

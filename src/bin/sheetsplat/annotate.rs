@@ -3,6 +3,7 @@
 use std::ffi::OsStr;
 use std::path::Path;
 
+use sheetsplat::SettingError;
 use sheetsplat::annotate::{self, Annotation, Layout};
 use sheetsplat::image::Image;
 use sheetsplat::internals::text::filled;
@@ -45,7 +46,11 @@ impl clap::builder::TypedValueParser for Named {
 }
 
 /// The words beside a scene's pictures; without any, pictures stay as they are.
-pub(crate) struct Words(Option<Layout>);
+pub(crate) struct Words {
+    layout: Option<Layout>,
+    /// The names of the annotations.
+    names: Vec<String>,
+}
 
 impl Annotate {
     /// Whether there are no words.
@@ -63,11 +68,19 @@ impl Annotate {
         explicit: impl Fn(&Scene, &Volume) -> Scene,
     ) -> Result<(Words, Scene), Failure> {
         let scene = input.settled(volume, scene, |scene, _| scene.clone())?;
-        let layout = || annotate::layout(&self.annotate, &scene, volume);
-        let layout = (!self.is_empty()).then(layout).transpose();
-        let words = layout.map(Words).map_err(|error| Failure::Input(format!("--{error}")))?;
-        let beside = words.0.as_ref().map_or_else(|| scene.clone(), |layout| layout.scene(&scene));
-        Ok((words, explicit(&beside, volume)))
+        let invalid = |error: SettingError| Failure::Input(format!("--{error}"));
+        let chosen = if self.is_empty() {
+            // A picture has the words that it had.
+            input.picture.annotations().iter().map(|name| name.parse()).collect::<Result<_, _>>().map_err(invalid)?
+        } else {
+            self.annotate.clone()
+        };
+        let layout = || annotate::layout(&chosen, &scene, volume);
+        let layout = (!chosen.is_empty()).then(layout).transpose().map_err(invalid)?;
+        let beside = layout.as_ref().map_or_else(|| scene.clone(), |layout| layout.scene(&scene));
+        let is_chosen = |(_, annotation): &(&str, Annotation)| chosen.contains(annotation);
+        let names = Annotation::ALL.into_iter().filter(is_chosen).map(|(name, _)| name.to_owned()).collect();
+        Ok((Words { layout, names }, explicit(&beside, volume)))
     }
 
     /// Checks that the output is a picture to look at, not data.
@@ -83,14 +96,19 @@ impl Annotate {
 }
 
 impl Words {
+    /// The names of the annotations.
+    pub(crate) fn names(&self) -> &[String] {
+        &self.names
+    }
+
     /// The scene of the whole image, for that of a picture.
     pub(crate) fn whole(&self, scene: &Scene) -> Scene {
-        self.0.as_ref().map_or_else(|| scene.clone(), |layout| layout.whole(scene))
+        self.layout.as_ref().map_or_else(|| scene.clone(), |layout| layout.whole(scene))
     }
 
     /// The image of a scene's picture with its words.
     pub(crate) fn draw(&self, picture: Image, scene: &Scene, volume: &Volume) -> Image {
-        match &self.0 {
+        match &self.layout {
             Some(layout) => layout.draw(&picture, scene, volume),
             None => picture,
         }
@@ -98,7 +116,7 @@ impl Words {
 
     /// Adds the words to a hash, for the camera of a picture's scene.
     pub(crate) fn add_to(&self, hash: &mut blake3::Hasher, scene: &Scene, volume: &Volume) {
-        if self.0.is_some() {
+        if self.layout.is_some() {
             let blank = filled([scene.image.width, scene.image.height], [0.0; 4]);
             let Image { width, height, pixels } = self.draw(blank, scene, volume);
             [width, height].iter().for_each(|number| _ = hash.update(&number.to_le_bytes()));

@@ -17,6 +17,7 @@ use sheetsplat::volume::{self, ReadOptions, StreamedVolume, Volume};
 
 use crate::failure::Failure;
 use crate::outputs::Outputs;
+use crate::picture::{self, Picture};
 use crate::reading::Reading;
 use crate::stdin;
 
@@ -46,8 +47,8 @@ const FREESURFER: &str = "freesurfer";
 /// The scene to draw, and the adapter.
 #[derive(clap::Args)]
 pub(crate) struct Input {
-    /// A scene file (.toml), a volume file, the address of a Zarr store (http:// or https://), builtin:NAME[:N], or - for a volume file from standard input,
-    /// of a format that its first bytes tell and whose header names no other file.
+    /// A scene file (.toml), a picture that tells its scene (.png, .exr), a volume file, the address of a Zarr store (http:// or https://), builtin:NAME[:N],
+    /// or - for a volume file from standard input, of a format that its first bytes tell and whose header names no other file.
     #[arg(value_name = "INPUT")]
     pub(crate) name: String,
     /// Set a scene value, as in --set splatting.slab_width=2.0. Can be repeated.
@@ -59,6 +60,8 @@ pub(crate) struct Input {
     look: Look,
     #[command(flatten)]
     pub(crate) reading: Reading,
+    #[command(flatten)]
+    pub(crate) picture: Picture,
     /// The ranges of the values in the volume's chunks, made by `sheetsplat index`: where the volume fits into no memory, chunks are not read whose values
     /// cannot be seen.
     #[arg(long, value_name = "FILE")]
@@ -233,6 +236,9 @@ impl Input {
         let scene = match self.name.strip_prefix("builtin:") {
             Some(name) => Scene::from_volume(VolumeSource::Builtin(name.to_owned()), &sets),
             None if self.is_scene_file() => Scene::open_with(self.name.as_ref(), &sets, &self.options()),
+            None if picture::is_picture(&self.name) => {
+                self.picture.scene(self.name.as_ref(), &sets, &self.options())?
+            }
             None => Scene::from_volume(VolumeSource::File(self.name.clone().into()), &sets),
         };
         let scene = scene.map_err(|error| self.by_flag(&error))?;
@@ -299,7 +305,8 @@ impl Input {
 
     /// The input files named by the arguments and the scene. A header may name more.
     pub(crate) fn files(&self, scene: &Scene) -> Vec<PathBuf> {
-        let scene_file = self.is_scene_file().then(|| self.name.clone().into());
+        let is_read = self.is_scene_file() || picture::is_picture(&self.name);
+        let scene_file = is_read.then(|| self.name.clone().into());
         let mut files: Vec<PathBuf> = scene_file.into_iter().chain(self.index.clone()).collect();
         for channel in &scene.channels {
             files.extend(channel.volume.path().map(Path::to_path_buf));
@@ -356,7 +363,7 @@ impl Input {
 
     /// Opens the volume without logging anything.
     pub(crate) fn read_volume(&self, scene: &Scene, outputs: &Outputs) -> Result<OpenVolume, Failure> {
-        let options = self.options().with_outputs(outputs.written());
+        let options = self.options().with_outputs(outputs.written()).noted_in(&self.picture.noting());
         scene.open_volume_with(&options).map_err(|error| self.failure(error))
     }
 
@@ -406,7 +413,8 @@ impl Input {
         profile: bool,
         scenes: impl IntoIterator<Item = &'a Scene>,
     ) -> Result<Headless, Failure> {
-        let mut options = HeadlessOptions::default().with_profile(profile).with_backend(self.backend);
+        let backend = self.picture.backend(self.backend);
+        let mut options = HeadlessOptions::default().with_profile(profile).with_backend(backend);
         options.adapter = self.adapter.clone();
         let start = Instant::now();
         let headless = Headless::for_scenes(&options, scenes).map_err(|error| Failure::Other(error.to_string()))?;

@@ -20,12 +20,14 @@ mod memory;
 mod orbit;
 mod outputs;
 mod parts;
+mod picture;
 mod progress;
 mod reading;
 mod render;
 mod stdin;
 mod stdout;
 mod sweep;
+mod verify;
 #[cfg(feature = "viewer")]
 mod view;
 
@@ -43,6 +45,7 @@ Examples:
   sheetsplat render scene.toml -o image.exr --set camera.direction=[1,0,0]
   sheetsplat orbit head.nrrd -o turn.gif
   sheetsplat info head.nrrd
+  sheetsplat verify head.png
   sheetsplat adapters
 
 Exit codes: 0 success, 2 bad usage or input, 1 anything else. Logs: -v, or the environment variable RUST_LOG.";
@@ -81,7 +84,9 @@ enum Command {
     Split(parts::split::Arguments),
     /// Compare two images and print the differences; exit code 1 if they exceed the tolerance.
     Compare(compare::Arguments),
-    /// Describe a volume: format, size, unit, orientation, and the distribution of its values.
+    /// Draw pictures again from the scenes in their files; exit code 1 if a pixel differs, and why.
+    Verify(verify::Arguments),
+    /// Describe a volume: format, size, unit, orientation, and the distribution of its values; or how a picture was made.
     Info(info::Arguments),
     /// List the adapters, whether each is usable, and if not, which limits it lacks.
     Adapters(adapters::Arguments),
@@ -124,6 +129,7 @@ fn main() -> ExitCode {
         Command::Index(arguments) => index::run(&arguments, progress),
         Command::Split(arguments) => parts::split::run(&arguments),
         Command::Compare(arguments) => compare::run(&arguments),
+        Command::Verify(arguments) => verify::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
         Command::Completions(arguments) => documents::completions(&arguments, Arguments::command()),

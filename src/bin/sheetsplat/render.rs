@@ -15,6 +15,7 @@ use crate::look;
 use crate::memory::peak_rss_mib;
 use crate::outputs::{self, Outputs};
 use crate::parts::Part;
+use crate::picture::{Metadata, Told};
 use crate::progress::{Progress, tell};
 
 #[derive(clap::Args)]
@@ -25,6 +26,7 @@ Examples:
   sheetsplat render ct.nii.gz -o face.png --view front
   sheetsplat render ct.raw -o ct.png --dims 256,256,113 --type uint16 --endian big
   sheetsplat render ct.nrrd -o skull.png --preset ct-bone --annotate scale --save-scene skull.toml
+  sheetsplat render skull.png -o closer.png --set camera.height=120
   sheetsplat render cells.nrrd -o cells.png --preset confocal --colormap magma --annotate scale,colors
   sheetsplat render scene.toml -o part.exr --slabs 0..64 --region 0,0,512,256 --light light.npz")]
 pub(crate) struct Arguments {
@@ -42,6 +44,8 @@ pub(crate) struct Arguments {
     /// Write the complete scene that was rendered as a scene file, with everything that presets, colour maps and the volume determined.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
+    #[command(flatten)]
+    metadata: Metadata,
     #[command(flatten)]
     annotate: Annotate,
     #[command(flatten)]
@@ -96,7 +100,11 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
             let Rendering { image, mut stats } = headless.draw(&mut view).map_err(|error| input.failure(error))?;
             stats.prepare_ms += view_ms;
             let image = words.draw(image, &scene, volume.sample());
-            (image.encode(output, arguments.depth.into())?, stats)
+            let whole = words.whole(&scene);
+            let sources = arguments.metadata.sources(&input.picture, (&volume, &whole))?;
+            let told =
+                sources.as_ref().map(|sources| Told { scene: &whole, sources, stats: &stats, annotate: words.names() });
+            (arguments.metadata.encode(&image, (output, arguments.depth), told)?, stats)
         }
     };
     drop(bar);

@@ -15,6 +15,7 @@ use sheetsplat::volume::{Orientation, SampleType, StreamedVolume, Volume};
 use crate::arguments::Input;
 use crate::failure::Failure;
 use crate::outputs::Outputs;
+use crate::picture;
 use crate::stdout::stdout;
 use statistics::{Histogram, extent_and_mean};
 
@@ -22,7 +23,8 @@ use statistics::{Histogram, extent_and_mean};
 #[command(after_help = "\
 Examples:
   sheetsplat info head.nii.gz
-  sheetsplat info series/ --json")]
+  sheetsplat info series/ --json
+  sheetsplat info head.png")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     input: Input,
@@ -116,6 +118,9 @@ impl Frame {
 
 pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
     let input = &arguments.input;
+    if picture::is_picture(&input.name) {
+        return stdout(of_picture(input, arguments.json)?.as_bytes());
+    }
     let scene = input.scene()?;
     let outputs = Outputs::check(&[], true, &input.files(&scene))?;
     // What is told is about the volume itself, whatever a picture would show of it.
@@ -159,6 +164,15 @@ pub(crate) fn run(arguments: &Arguments) -> Result<(), Failure> {
         plain_whole(&described(&info, volume, scene.channels.first().index.unwrap_or(0))).to_string()
     };
     stdout(text.as_bytes())
+}
+
+/// How a picture was made, without a look at the files that its scene names.
+fn of_picture(input: &Input, is_json: bool) -> Result<String, Failure> {
+    let made = picture::open(input.name.as_ref(), &input.options())?;
+    if !is_json {
+        return Ok(plain_whole(&made.to_string()).to_string());
+    }
+    Ok(made.to_json().map_err(|error| Failure::Other(error.to_string()))? + "\n")
 }
 
 /// The sizes of the levels of a store with levels.

@@ -15,6 +15,7 @@ use sheetsplat::headless::HeadlessView;
 use sheetsplat::image::Image;
 use sheetsplat::image::output::Target;
 use sheetsplat::internals::fingerprint;
+use sheetsplat::provenance::Sources;
 use sheetsplat::scene::{OpenVolume, Scene};
 use sheetsplat::{RenderError, StoredLight};
 
@@ -23,6 +24,7 @@ use crate::arguments::{Depth, Input, check_scene_file, log_frame, parse_degrees,
 use crate::failure::Failure;
 use crate::light::{self, Stored};
 use crate::outputs::{self, Outputs};
+use crate::picture::{Metadata, Told};
 use crate::progress::{Progress, tell};
 use made::Made;
 use movie::{Encoder, Format, Settings};
@@ -58,6 +60,8 @@ pub(crate) struct Arguments {
     /// frame from it, and any other frame with camera.direction turned.
     #[arg(long, value_name = "FILE")]
     save_scene: Option<PathBuf>,
+    #[command(flatten)]
+    metadata: Metadata,
     /// Draw numbered images again that were drawn before. Without it they are kept if they show the same and are whole.
     #[arg(long)]
     overwrite: bool,
@@ -118,9 +122,9 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
         is_kept
     };
     let (shown, volume) = Shown::load(arguments, (scene, times), &outputs, true)?;
-    shown.draw(arguments, (volume, &frames), progress, is_kept, |frame, shown, image| {
+    shown.draw(arguments, (volume, &frames), progress, is_kept, |frame, shown, (image, told)| {
         let path = pattern.path(frame);
-        let bytes = image.encode(&path, arguments.depth.into())?;
+        let bytes = arguments.metadata.encode(image, (&path, arguments.depth), told)?;
         outputs::write(&[(&path, bytes.clone())], &[])?;
         made.add(shown, &bytes).map_err(outputs::failed(made.path()))
     })?;
@@ -162,7 +166,7 @@ fn movie(
             (volume, &frames),
             progress,
             |_, _| false,
-            |_, _, image| encoder.add(image).map_err(failed),
+            |_, _, (image, _)| encoder.add(image).map_err(failed),
         )?;
         encoder.finish().and_then(|()| to.flush()).map_err(failed)
     };
@@ -184,6 +188,8 @@ struct Shown<'a> {
     outputs: &'a Outputs,
     /// Whether frames that were drawn before may be kept, for which their hashes are needed.
     is_resumed: bool,
+    /// Whether frames tell nothing beside their pixels.
+    is_bare: bool,
     light: Option<Arc<StoredLight>>,
 }
 
@@ -205,7 +211,8 @@ impl<'a> Shown<'a> {
             return Err(Failure::Input(format!("--time: found {start}..{end}, allowed: {allowed}")));
         }
         let (words, scene) = annotate.settled(input, volume.sample(), &scene, Scene::explicit_all_around)?;
-        Ok((Self { scene, times, words, outputs, is_resumed, light }, volume))
+        let is_bare = arguments.metadata.is_bare();
+        Ok((Self { scene, times, words, outputs, is_resumed, is_bare, light }, volume))
     }
 
     /// The time that a frame shows: all times take turns over all frames.
@@ -223,8 +230,17 @@ impl<'a> Shown<'a> {
         }
         hash.update(fingerprint(volume, &self.scene)?.as_bytes());
         hash.update(&[u8::from(depth == Depth::Sixteen)]);
+        if self.is_bare {
+            hash.update(b"without metadata");
+        }
         self.words.add_to(&mut hash, &self.scene, volume.sample());
         Ok(hash)
+    }
+
+    /// What the volume of frames that are pictures was read from, if they are to tell it.
+    fn sources(&self, arguments: &Arguments, volume: &OpenVolume, scene: &Scene) -> Result<Option<Sources>, Failure> {
+        let sources = || arguments.metadata.sources(&arguments.input.picture, (volume, scene));
+        if self.is_resumed { sources() } else { Ok(None) }
     }
 
     /// Draws frames and passes them on, except those that are kept, given the hash of what they show. Each is independent of the others. No more than one
@@ -235,7 +251,7 @@ impl<'a> Shown<'a> {
         (volume, frames): (OpenVolume, &[u32]),
         progress: bool,
         is_kept: impl Fn(u32, blake3::Hash) -> bool,
-        mut take: impl FnMut(u32, blake3::Hash, &Image) -> Result<(), Failure>,
+        mut take: impl FnMut(u32, blake3::Hash, (&Image, Option<Told<'_>>)) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let Arguments { input, turn, count, save_scene, depth, .. } = arguments;
         let progress = Progress::new(frames.len(), progress);
@@ -247,16 +263,18 @@ impl<'a> Shown<'a> {
             let check = |frame: &u32| light.check(&turned(*frame));
             frames.iter().try_for_each(check).map_err(|error| input.failure(RenderError::from(error)))?;
         }
-        let mut current =
-            Current { time: scene.channels.first().time, hash: self.hash(&volume, *depth)?, ..Current::default() };
+        let mut current = Current { time: scene.channels.first().time, ..Current::new(scene.clone()) };
+        current.hash = self.hash(&volume, *depth)?;
+        current.sources = self.sources(arguments, &volume, scene)?;
         current.volume = Some(progress.watch(volume));
         let mut headless = None;
         for &frame in frames {
             if let Some(time) = self.time_of(frame, *count).filter(|&time| current.time != Some(time)) {
                 // The old view is dropped before the next time is read.
-                current = Current { time: Some(time), ..Current::default() };
-                let volume = input.read_volume(&at_time(scene, time), self.outputs)?;
+                current = Current { time: Some(time), ..Current::new(at_time(scene, time)) };
+                let volume = input.read_volume(&current.scene, self.outputs)?;
                 current.hash = self.hash(&volume, *depth)?;
+                current.sources = self.sources(arguments, &volume, &current.scene)?;
                 current.volume = Some(progress.watch(volume));
             }
             let shown = current.shown(angle(frame));
@@ -278,7 +296,15 @@ impl<'a> Shown<'a> {
             view.set_camera(turned.camera).map_err(|error| input.failure(RenderError::from(error)))?;
             let rendering = headless.draw(view).map_err(|error| input.failure(error))?;
             let image = self.words.draw(rendering.image, &turned, view.volume().sample());
-            take(frame, shown, &image)?;
+            let whole = self.words.whole(&Scene { camera: turned.camera, ..current.scene.clone() });
+            let annotate = self.words.names();
+            let told = current.sources.as_ref().map(|sources| Told {
+                scene: &whole,
+                sources,
+                stats: &rendering.stats,
+                annotate,
+            });
+            take(frame, shown, (&image, told))?;
             log_frame(&format!("frame {frame}"), &rendering.stats);
             progress.step();
         }
@@ -290,9 +316,12 @@ impl<'a> Shown<'a> {
 }
 
 /// The time that is in memory.
-#[derive(Default)]
 struct Current {
     time: Option<u32>,
+    /// The scene at this time.
+    scene: Scene,
+    /// What its volume was read from, if frames tell it.
+    sources: Option<Sources>,
     /// Before a frame of it is drawn.
     volume: Option<OpenVolume>,
     /// From then on.
@@ -301,6 +330,11 @@ struct Current {
 }
 
 impl Current {
+    fn new(scene: Scene) -> Self {
+        let hash = blake3::Hasher::new();
+        Self { time: None, scene, sources: None, volume: None, view: None, hash }
+    }
+
     /// The hash of what a frame shows, turned by some degrees.
     fn shown(&self, angle: f64) -> blake3::Hash {
         self.hash.clone().update(&angle.to_le_bytes()).finalize()

@@ -1,0 +1,58 @@
+//! Some pixels of a picture beside the f64 evaluation of the same scene.
+
+use std::fmt::{self, Display, Formatter};
+
+use crate::error::RenderError;
+use crate::headless::reference;
+use crate::image::Image;
+use crate::scene::{OpenVolume, Scene};
+
+/// How far pixels of a picture are from the f64 evaluation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviation {
+    /// The number of pixels that were evaluated.
+    pub pixels: u32,
+    /// The largest difference of a channel, of 255, premultiplied.
+    pub largest: f64,
+    /// Column and row of the pixel that has it.
+    pub at: [u32; 2],
+}
+
+impl Deviation {
+    /// That of `count` pixels of a scene's picture, without words, chosen by a fixed sequence.
+    ///
+    /// # Errors
+    /// If the volume is streamed, or the scene needs more than the f64 evaluation can compute.
+    pub(super) fn of(volume: &OpenVolume, scene: &Scene, picture: &Image, count: u32) -> Result<Self, RenderError> {
+        let size = [picture.width, picture.height];
+        let chosen: Vec<[u32; 2]> = (0..count).map(|number| chosen(number, size)).collect();
+        let exact = reference::pixels(volume, scene, &chosen)?;
+        let mut deviation = Self { pixels: count, largest: 0.0, at: [0, 0] };
+        for (at, exact) in chosen.into_iter().zip(exact) {
+            let drawn = picture.pixels[at[1] as usize * size[0] as usize + at[0] as usize];
+            let channels =
+                drawn.into_iter().zip(exact).map(|(drawn, exact)| (f64::from(drawn) - f64::from(exact)).abs());
+            // In total order NaN is larger than any number.
+            let largest = 255.0 * channels.max_by(f64::total_cmp).unwrap_or(0.0);
+            if largest.total_cmp(&deviation.largest).is_gt() {
+                (deviation.largest, deviation.at) = (largest, at);
+            }
+        }
+        Ok(deviation)
+    }
+}
+
+/// A pixel by its number in a sequence that looks random and is the same everywhere.
+fn chosen(number: u32, [width, height]: [u32; 2]) -> [u32; 2] {
+    let hash = blake3::hash(&number.to_le_bytes());
+    let (words, _) = hash.as_bytes().as_chunks::<8>();
+    let below = |word: [u8; 8], side: u32| (u64::from_le_bytes(word) % u64::from(side)) as u32;
+    [below(words[0], width), below(words[1], height)]
+}
+
+impl Display for Deviation {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { pixels, largest, at: [x, y] } = self;
+        write!(f, "{pixels} pixels differ from the f64 evaluation by at most {largest:.4} of 255, at x {x}, y {y}")
+    }
+}
