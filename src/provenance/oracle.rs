@@ -53,6 +53,43 @@ fn chosen(number: u32, [width, height]: [u32; 2]) -> [u32; 2] {
 impl Display for Deviation {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { pixels, largest, at: [x, y] } = self;
-        write!(f, "{pixels} pixels differ from the f64 evaluation by at most {largest:.4} of 255, at x {x}, y {y}")
+        write!(f, "{pixels} pixels differ from the f64 evaluation by at most {largest:.2e} of 255, at x {x}, y {y}")
+    }
+}
+
+#[cfg(test)]
+#[expect(clippy::unwrap_used, reason = "tests")]
+mod tests {
+    use super::*;
+    use crate::scene::VolumeSource;
+
+    /// Single pixels are those of the whole evaluation, whatever a scene composites, and a pixel that is wrong is found.
+    #[test]
+    fn single_pixels_are_those_of_the_whole_evaluation() {
+        for settings in [
+            "splatting.classification=before",
+            "splatting.classification=after",
+            "splatting={compositing=\"average\",classification=\"after\"}",
+            "splatting={compositing=\"maximum\"}",
+            "splatting={compositing=\"surface\",classification=\"before\"}",
+            "splatting={method=\"axis-aligned\"}",
+            "shading={occlusion=0.7,shadow=0.5}",
+            "clip.crop=[[-20,-20,-20],[9,20,20]]",
+        ] {
+            let sets = ["image={width=14,height=11,background=[0.2,0.1,0.3,0.5]}".to_owned(), settings.to_owned()];
+            let scene = Scene::from_volume(VolumeSource::Builtin("head:12".to_owned()), &sets).unwrap();
+            let volume = OpenVolume::from(scene.load_volume().unwrap());
+            let scene = scene.explicit(volume.sample());
+            let transfer = scene.resolve(volume.sample());
+            let mut image = crate::reference::render(volume.sample(), &transfer, &scene).unwrap();
+            let deviation = Deviation::of(&volume, &scene, &image, 60).unwrap();
+            assert!(deviation.largest < 1e-4, "{settings}: {deviation}");
+            let [x, y] = chosen(59, [14, 11]);
+            image.pixels[(y * 14 + x) as usize][2] += 0.5;
+            let deviation = Deviation::of(&volume, &scene, &image, 60).unwrap();
+            assert!((deviation.largest - 127.5).abs() < 1e-3 && deviation.at == [x, y], "{settings}: {deviation}");
+            image.pixels[(y * 14 + x) as usize][2] = f32::NAN;
+            assert!(Deviation::of(&volume, &scene, &image, 60).unwrap().largest.is_nan());
+        }
     }
 }

@@ -112,7 +112,7 @@ fn pictures_are_the_same_when_they_are_drawn_again() {
     });
     let deviations: Vec<f64> = deviations.collect();
     assert!(
-        deviations.len() == 2 && deviations.iter().all(|&deviation| deviation > 0.0 && deviation < 13.0),
+        deviations.len() == 2 && deviations.iter().all(|&deviation| deviation > 0.0 && deviation < 0.01),
         "{}",
         run.stdout
     );
@@ -378,8 +378,8 @@ fn hostile_pictures_are_refused() {
         folder.assert_unverified("b.png", 2, &["b.png: cannot be verified: ", words]);
     }
     // A text that is short in the file and endless when it is read.
-    write(&" ".repeat(40 << 20));
-    assert!(folder.read("b.png").len() < 8 << 20);
+    write(&"\0".repeat(40 << 20));
+    assert!(folder.read("b.png").len() < 1 << 20);
     folder.assert_unverified("b.png", 2, &["b.png: cannot be verified: "]);
     folder.write("short.png", &picture[..picture.len() / 2]);
     folder.assert_unverified("short.png", 2, &["short.png: cannot be verified: "]);
