@@ -31,6 +31,7 @@ from .image import Image
 from .part import Part, merge
 from .scene import Scene
 from .turntable import orbit, sweep
+from .verification import Verification, verify
 from .view import View, info, render
 from .volume import Volume
 
@@ -48,6 +49,7 @@ __all__ = [
     "SceneError",
     "SheetsplatError",
     "SheetsplatWarning",
+    "Verification",
     "View",
     "Volume",
     "VolumeError",
@@ -60,6 +62,7 @@ __all__ = [
     "presets",
     "render",
     "sweep",
+    "verify",
 ]
 
 atexit.register(_native.tidy)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import operator
+import os
 from collections.abc import Sequence
 from typing import Any
 
 from .errors import SceneError, VolumeError, _Refused
 
-__all__ = ["finite", "names", "refused", "volume_refused", "whole"]
+__all__ = ["finite", "names", "paths", "refused", "volume_refused", "whole"]
 
 
 def refused(kind: type[_Refused], key: str, found: object, allowed: str) -> _Refused:
@@ -54,3 +55,12 @@ def names(annotate: str | Sequence[str]) -> list[str]:
     if not all(isinstance(text, str) for text in texts):
         raise refused(SceneError, "annotate", repr(annotate), "names of annotations")
     return texts
+
+
+def paths(search: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[str]:
+    """Folders: one, or several."""
+    given: Any = [search] if isinstance(search, (str, os.PathLike)) else search
+    try:
+        return [os.path.expanduser(os.fsdecode(path)) for path in given]
+    except TypeError as error:
+        raise refused(SceneError, "search", repr(search), "folders") from error

@@ -44,19 +44,22 @@ class Image:
     (64, 48, [0.0, 0.0, 0.0, 1.0])
     """
 
-    __slots__ = ("__weakref__", "_array", "_inputs", "_made_on", "stats")
+    __slots__ = ("__weakref__", "_array", "_inputs", "_made_on", "_provenance", "stats")
     stats: dict[str, Any]
     _array: NDArray[np.float32]
     _made_on: tuple[str, str] | None
     #: The files that were read for it; it may replace none of them.
     _inputs: Sequence[_native.Inputs]
+    #: How it was made, if it was drawn in this process.
+    _provenance: _native.Provenance | None
 
     def __init__(self, array: Any) -> None:
         if isinstance(array, Image):
             self._array, self.stats, self._made_on = array._array, array.stats, array._made_on
-            self._inputs = array._inputs
+            self._inputs, self._provenance = array._inputs, array._provenance
             return
         self._array, self.stats, self._made_on, self._inputs = _premultiplied(array), {}, None, ()
+        self._provenance = None
 
     @classmethod
     def _of(
@@ -65,9 +68,11 @@ class Image:
         stats: dict[str, Any],
         made_on: tuple[str, str] | None,
         inputs: Sequence[_native.Inputs] = (),
+        provenance: _native.Provenance | None = None,
     ) -> Image:
         image = cls.__new__(cls)
         image._array, image.stats, image._made_on, image._inputs = array, stats, made_on, inputs
+        image._provenance = provenance
         return image
 
     @classmethod
@@ -160,8 +165,12 @@ class Image:
         else:
             self.to_pil().show()
 
-    def save(self, path: str | os.PathLike[str], *, depth: int = 8) -> None:
+    def save(self, path: str | os.PathLike[str], *, depth: int = 8, metadata: bool = True) -> None:
         """Saves the picture by the file's extension.
+
+        A PNG or EXR file of a picture that was drawn in this process tells how: the scene, the version, the backend, and
+        hashes of the pixels and of the files that were read, or of the values of a volume from memory that is still there.
+        It names no folder outside its own. `sheetsplat.verify` draws it again.
 
         Parameters
         ----------
@@ -170,6 +179,8 @@ class Image:
             opaque pixels), ``.tif`` and ``.webp`` (without loss), of 8 bits with straight alpha.
         depth : {8, 16}
             Bits per channel of a PNG.
+        metadata : bool
+            Whether the file tells how the picture was made.
 
         Raises
         ------
@@ -189,7 +200,7 @@ class Image:
             _native.write(name, formats.encoded(self.to_uint8(), name, kind, depth), self._inputs)
             return
         formats.check(name)
-        _native.save(self._array, name, depth, self._inputs)
+        _native.save(self._array, name, depth, self._inputs, self._provenance if metadata else None)
 
     def __reduce__(self) -> Any:
         # The files that were read matter in this process alone.

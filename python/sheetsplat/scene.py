@@ -10,7 +10,7 @@ from typing import Any, Unpack
 
 from . import _native as native
 from . import _words as words
-from ._checks import finite, names, refused
+from ._checks import finite, names, paths, refused
 from ._loading import loading
 from ._settings import Settings, Side, completed
 from .errors import FileError, SceneError
@@ -117,6 +117,35 @@ class Scene:
         scene = cls.__new__(cls)
         scene._keep(checked, {})
         return scene
+
+    @classmethod
+    def from_picture(
+        cls, path: str | os.PathLike[str], *, search: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = ()
+    ) -> Scene:
+        """The scene of a picture that tells how it was made, with its volume if that came from a file.
+
+        Parameters
+        ----------
+        path : path
+            A PNG or EXR file that `Image.save`, or ``sheetsplat render``, wrote.
+        search : path or sequence of path
+            Folders in which to look for files that are not in the picture's own folder.
+
+        Returns
+        -------
+        Scene
+            The scene. It draws the same picture by the same backend, without the words beside it.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be read.
+        ImageError
+            If it holds no scene.
+        SceneError
+            If a file is missing that the scene names.
+        """
+        return cls._of(native.scene_of_picture(os.path.expanduser(os.fsdecode(path)), paths(search)))
 
     @property
     def _native(self) -> native.Scene:

@@ -98,7 +98,9 @@ class View:
         volume, self._stated = _what_and_how(source, spacing, labels, scene, settings, memory, progress, index)
         self._volume, self._annotate = volume, names(annotate)
         self._scene = self._stated._for(volume, annotate=self._annotate)
-        self._native = native.View(volume._native, self._scene._native, backend, adapter, self._annotate, light)
+        self._native = native.View(
+            volume._native, self._scene._native, backend, adapter, self._annotate, light, volume._named()
+        )
         self._inputs = [volume._native.inputs]
 
     @property
@@ -183,8 +185,8 @@ class View:
         """
         if settings:
             self.set(**settings)
-        array, stats, made_on = self._native.draw()
-        return Image._of(array, json.loads(stats), made_on, self._inputs)
+        array, stats, made_on, provenance = self._native.draw()
+        return Image._of(array, json.loads(stats), made_on, self._inputs, provenance)
 
     def to_html(self, path: str | os.PathLike[str]) -> None:
         """Saves a page of one file, in which the volume turns in a browser of 2023 or later, without a network.

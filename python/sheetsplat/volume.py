@@ -224,6 +224,28 @@ class Volume:
             self._range = native.value_range(self._native)
         return self._range
 
+    def _named(self) -> native.Scene | None:
+        """A scene that names the volume, for the files of its pictures; of one from memory there is none."""
+        origin = self._origin
+        if origin is None or origin.has_labels:
+            return None
+        keys: dict[str, Any] = {}
+        if origin.spacing is not None:
+            keys["volume.spacing"] = list(reversed(origin.spacing))
+        if not isinstance(origin.what, str):
+            stated = origin.what._bare
+            return stated.replaced(keys | {"volume.level": self.level} if self.level > 0 else keys)
+        if origin.what.startswith(_BUILTIN):
+            keys["volume.builtin"] = origin.what.removeprefix(_BUILTIN)
+        else:
+            keys["volume.path"] = origin.what
+        for key, number in zip(("index", "time", "level"), origin.selection, strict=True):
+            if number is not None:
+                keys[f"volume.{key}"] = number
+        if origin.series is not None:
+            keys["volume.series"] = str(origin.series)
+        return native.Scene("", "volume", ".", keys)
+
     def __reduce__(self) -> Any:
         if self._origin is not None:
             labels = native.label_array(self._native) if self._origin.has_labels else None

@@ -6,6 +6,7 @@ use pyo3::PyErr;
 use sheetsplat::golden::{ComparisonError, GoldenError, LaxTolerance};
 use sheetsplat::image::ImageError;
 use sheetsplat::part::MergeError;
+use sheetsplat::provenance::Unverifiable;
 use sheetsplat::scene::SceneError;
 use sheetsplat::volume::VolumeError;
 use sheetsplat::{DeviceError, RenderError, SettingError, headless};
@@ -155,6 +156,18 @@ impl From<ImageError> for Raised {
             ImageError::Io { path, source, .. } => file(path, source),
             _ => Self(classes::ImageError::new_err(error.to_string())),
         }
+    }
+}
+
+/// The exception for a picture that is not allowed.
+pub(crate) fn picture(path: &std::path::Path, found: &str, allowed: &str) -> Raised {
+    Raised(classes::ImageError::new_err(format!("{}: found {found}, allowed: {allowed}", path.display())))
+}
+
+/// The exception for a picture that cannot be verified.
+impl From<Unverifiable> for Raised {
+    fn from(error: Unverifiable) -> Self {
+        Self(classes::ImageError::new_err(error.to_string()))
     }
 }
 

@@ -13,6 +13,7 @@ use sheetsplat::volume::{self, Outputs};
 
 use crate::error::{self, Raised, setting};
 use crate::process::{detached, may_commit, prepare_numpy};
+use crate::provenance::Provenance;
 
 /// The pixels as an array height × width × 4 that owns them.
 pub(crate) fn array(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
@@ -49,7 +50,7 @@ pub(crate) fn check_format(path: PathBuf) -> PyResult<()> {
     Ok(Image::check_format(&path).map_err(Raised::from)?)
 }
 
-/// Saves a picture by the file's extension, unless that is the file of an input.
+/// Saves a picture by the file's extension, unless that is the file of an input, with the text of how it was made.
 #[pyfunction]
 pub(crate) fn save(
     py: Python<'_>,
@@ -57,11 +58,15 @@ pub(crate) fn save(
     path: PathBuf,
     depth: u8,
     inputs: Vec<PyRef<'_, Inputs>>,
+    provenance: Option<Py<Provenance>>,
 ) -> PyResult<()> {
     let (image, depth) = (image(&array)?, png_depth(depth)?);
     refuse(&inputs, [&path])?;
     detached(py, move || {
-        let bytes = image.encode(&path, depth)?;
+        let bytes = match &provenance {
+            Some(made) => made.get().encode(&image, &path, depth)?,
+            None => image.encode(&path, depth)?,
+        };
         output(&path, &bytes)
     })
 }

@@ -10,6 +10,7 @@ mod golden;
 mod image;
 mod part;
 mod process;
+mod provenance;
 mod scene;
 mod settings;
 mod view;
@@ -34,6 +35,8 @@ mod _native {
     use crate::part::{Part, merge, split};
     #[pymodule_export]
     use crate::process::tidy;
+    #[pymodule_export]
+    use crate::provenance::{Provenance, scene_of_picture, verify};
     #[pymodule_export]
     use crate::scene::{Scene, presets};
     #[pymodule_export]

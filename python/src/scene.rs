@@ -42,8 +42,13 @@ impl Scene {
 
     /// A scene that was derived from this one.
     pub(crate) fn derived(&self, scene: sheetsplat::Scene) -> Result<Self, Raised> {
+        Self::of(scene, self.origin.clone())
+    }
+
+    /// A scene with a name for errors.
+    pub(crate) fn of(scene: sheetsplat::Scene, origin: String) -> Result<Self, Raised> {
         let folder = PathBuf::from(".");
-        Ok(Self { text: scene.to_toml(&folder)?, scene, origin: self.origin.clone(), folder, sets: Vec::new() })
+        Ok(Self { text: scene.to_toml(&folder)?, scene, origin, folder, sets: Vec::new() })
     }
 }
 

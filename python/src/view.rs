@@ -11,16 +11,19 @@ use sheetsplat::annotate::{Annotation, Layout, layout};
 use sheetsplat::golden::Subject;
 use sheetsplat::headless::{Backend, Headless, HeadlessOptions, HeadlessView};
 use sheetsplat::scene::OpenVolume;
+use sheetsplat::stats::Stats;
+use sheetsplat::volume;
 
 use crate::error::{Raised, forked, setting};
 use crate::image::{self, Inputs};
 use crate::part::{Part, window};
 use crate::process::{detached, is_forked, may_commit};
+use crate::provenance::{self, Known, Provenance};
 use crate::scene::{Scene, annotations};
 use crate::volume::Volume;
 
-/// A picture's pixels, its statistics as JSON, and the adapter and driver that made it.
-type Drawn<'py> = (Bound<'py, PyArray3<f32>>, String, Option<(String, String)>);
+/// A picture's pixels, its statistics as JSON, the adapter and driver that made it, and how it was made.
+type Drawn<'py> = (Bound<'py, PyArray3<f32>>, String, Option<(String, String)>, Provenance);
 
 /// A view of a volume for any number of pictures. One thread draws at a time.
 #[pyclass(frozen, module = "sheetsplat._native")]
@@ -33,6 +36,15 @@ struct Shared {
     current: Mutex<Current>,
     /// The process that made it, without which a device, and the threads that read a volume while it is drawn, are gone.
     bound_to: Option<u32>,
+    source: Source,
+}
+
+/// Where the volume comes from.
+struct Source {
+    /// A scene that names it, unless it is one from memory.
+    named: Option<sheetsplat::Scene>,
+    inputs: volume::Inputs,
+    known: Known,
 }
 
 /// What a view draws next.
@@ -53,6 +65,21 @@ impl Shared {
         if is_here { Ok(()) } else { Err(forked("a view that was made before")) }
     }
 
+    /// How the picture that was drawn last was made.
+    fn provenance(&self, current: &Current, stats: &Stats) -> Provenance {
+        let Source { named, inputs, known } = &self.source;
+        let is_shown = |(_, annotation): &(&str, Annotation)| self.annotations.contains(annotation);
+        Provenance {
+            scene: provenance::named(current.view.scene(), named.as_ref()),
+            layout: current.layout.clone(),
+            annotate: Annotation::ALL.into_iter().filter(is_shown).map(|(name, _)| name.to_owned()).collect(),
+            stats: stats.clone(),
+            volume: provenance::Drawn::of(&current.view.volume()),
+            inputs: inputs.clone(),
+            known: known.clone(),
+        }
+    }
+
     /// A picture that failed leaves a view that can draw the next one.
     fn lock(&self) -> MutexGuard<'_, Current> {
         self.current.lock().unwrap_or_else(PoisonError::into_inner)
@@ -62,6 +89,7 @@ impl Shared {
 #[pymethods]
 impl View {
     #[new]
+    #[expect(clippy::too_many_arguments, reason = "the package's Python part passes its own")]
     fn new(
         py: Python<'_>,
         volume: &Volume,
@@ -70,11 +98,14 @@ impl View {
         adapter: Option<String>,
         annotate: Vec<String>,
         light: Option<PathBuf>,
+        named: Option<&Scene>,
     ) -> PyResult<Self> {
         let annotations = annotations(&annotate)?;
         let backend: Backend = backend.parse().map_err(|allowed: String| {
             setting("backend", &format!("{backend:?}"), allowed.trim_start_matches("allowed: "))
         })?;
+        let named = named.map(|named| named.scene.clone());
+        let source = Source { named, inputs: volume.1.clone(), known: Known::default() };
         let (volume, scene) = (volume.0.clone(), scene.scene.clone());
         let is_streamed = matches!(volume, OpenVolume::Streamed(_));
         let view = detached(py, move || {
@@ -91,7 +122,7 @@ impl View {
             let current = Mutex::new(current);
             let is_bound = is_streamed || headless.backend() == Backend::Gpu;
             let bound_to = is_bound.then(std::process::id);
-            Ok(Shared { headless, annotations, current, bound_to })
+            Ok(Shared { headless, annotations, current, bound_to, source })
         })?;
         Ok(Self(Arc::new(view)))
     }
@@ -142,21 +173,22 @@ impl View {
     /// Draws a picture.
     fn draw<'py>(&self, py: Python<'py>) -> PyResult<Drawn<'py>> {
         let shared = Arc::clone(&self.0);
-        let (rendering, stats) = detached(py, move || {
+        let (rendering, stats, made) = detached(py, move || {
             shared.check_process()?;
             let mut current = shared.lock();
             let mut rendering = shared.headless.draw(&mut current.view).map_err(Raised::from)?;
             rendering.stats.prepare_ms = std::mem::take(&mut current.prepare_ms);
+            let made = shared.provenance(&current, &rendering.stats);
             if let Some(layout) = &current.layout {
                 let volume = current.view.volume();
                 rendering.image = layout.draw(&rendering.image, current.view.scene(), volume.sample());
             }
             let stats = serde_json::to_string(&rendering.stats);
-            Ok((rendering, stats))
+            Ok((rendering, stats, made))
         })?;
         let stats = stats.map_err(|error| pyo3::exceptions::PyRuntimeError::new_err(error.to_string()))?;
         let made_on = rendering.made_on().map(|made_on| (made_on.adapter, made_on.driver));
-        Ok((image::array(py, rendering.image)?, stats, made_on))
+        Ok((image::array(py, rendering.image)?, stats, made_on, made))
     }
 
     /// Draws a part of a picture, with its statistics as JSON.

@@ -17,7 +17,7 @@ mod joined;
 mod options;
 #[cfg(feature = "gpu")]
 pub mod readback;
-pub(crate) mod reference;
+mod reference;
 mod timed;
 mod view;
 

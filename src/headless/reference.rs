@@ -11,10 +11,10 @@ use crate::error::RenderError;
 use crate::error::setting::SettingError;
 use crate::finished::FinishedScene;
 use crate::geometry::view_geometry::ViewGeometry;
-use crate::part::{self, Content, Identity, Part};
+use crate::part::{self, Content, Part};
 use crate::pick::{FirstHits, Pick};
 use crate::reference::{self, Host, Lights};
-use crate::scene::{OpenVolume, Scene};
+use crate::scene::Scene;
 use crate::settings::camera::Camera;
 use crate::settings::splatting::check_first_hit;
 use crate::settings::window::{Region, Window};
@@ -22,35 +22,6 @@ use crate::stats::Stats;
 use crate::volume::Volume;
 
 /// A view of a volume, drawn in f64 with nothing culled.
-/// Pixels of a scene's image, given by their columns and rows; each costs about as much as a sheet of a whole one.
-///
-/// # Errors
-/// If the volume is streamed, or the scene needs more than can be computed.
-#[cfg(feature = "golden")]
-pub(crate) fn pixels(volume: &OpenVolume, scene: &Scene, at: &[[u32; 2]]) -> Result<Vec<[f32; 4]>, RenderError> {
-    let OpenVolume::Whole(whole) = volume else {
-        return Err(SettingError::new("volume", "one that is streamed", "one that fits into memory").into());
-    };
-    let mut view = ReferenceView::new(Arc::clone(whole), scene)?;
-    let window = Window::whole(view.finished.size());
-    let is_parted = part::check(whole, view.scene(), &window).is_ok() && !part::adds_up(whole, view.scene());
-    let (framed, geometry) = view.finished.framed(whole, whole.grid())?;
-    let identity = Identity::of((volume, view.scene()), &geometry)?;
-    if !is_parted || identity.notes_labels() {
-        let image = view.draw()?.image;
-        return Ok(at.iter().map(|[x, y]| image.pixels[(y * image.width + x) as usize]).collect());
-    }
-    let FinishedScene { scene, transfer } = &view.finished;
-    let lights = Arc::new(Lights::new(whole, transfer, &framed)?);
-    let slabs = geometry.slabs_of(whole.grid());
-    let pixel = |&[x, y]: &[u32; 2]| {
-        let window = Window { region: Region { x, y, width: 1, height: 1 }, ..window.clone() };
-        let content = reference::part(whole, transfer, (scene, Some(&lights)), &window.opened(&slabs))?;
-        Ok(part::resolved(content.into(), &identity).first().copied().unwrap_or_default())
-    };
-    at.iter().map(pixel).collect()
-}
-
 #[derive(Clone, Debug)]
 pub(super) struct ReferenceView {
     volume: Arc<Volume>,

@@ -2,16 +2,10 @@
 
 use std::path::Path;
 
-use super::format::Format;
+use super::format::{Format, MAX_TEXT};
 use super::open::{content, of_volume, read};
 use super::{Image, ImageError, PngDepth, exr, png};
 use crate::volume::{Access, ReadOptions};
-
-/// The keyword of the text: of an iTXt chunk in PNG files, of an attribute in EXR files.
-pub(super) const KEYWORD: &str = "sheetsplat picture";
-
-/// The maximum length of a text in bytes: that of a scene, each of whose characters may be escaped.
-pub(crate) const MAX_TEXT: usize = 32 << 20;
 
 /// What the pixels of a file are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

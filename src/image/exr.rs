@@ -9,7 +9,7 @@ use ::exr::meta::header::Header;
 use ::exr::prelude::{Image as File, ReadChannels, ReadLayers, SpecificChannels, Vec2, WritableImage};
 
 use super::Image;
-use super::described::KEYWORD;
+use super::format::KEYWORD;
 
 /// The bytes of a file with a text, of ASCII alone, that describes it.
 pub(super) fn encode(image: &Image, text: Option<&str>) -> Result<Vec<u8>, Error> {
@@ -29,6 +29,7 @@ pub(super) fn encode(image: &Image, text: Option<&str>) -> Result<Vec<u8>, Error
 }
 
 /// The text that describes a file.
+#[cfg(feature = "golden")]
 pub(super) fn text(bytes: &[u8]) -> Result<Option<String>, Error> {
     let text = |header: &Header| match header.own_attributes.other.get(KEYWORD.as_bytes()) {
         Some(AttributeValue::Text(text)) => Some(text.to_string()),

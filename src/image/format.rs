@@ -57,6 +57,13 @@ pub enum ImageError {
     },
 }
 
+/// The keyword of the text that describes a picture: of an iTXt chunk in PNG files, of an attribute in EXR files.
+pub(super) const KEYWORD: &str = "sheetsplat picture";
+
+/// The maximum length of such a text in bytes: that of a scene, each of whose characters may be escaped.
+#[cfg(feature = "golden")]
+pub(crate) const MAX_TEXT: usize = 32 << 20;
+
 /// File formats by extension, ignoring case.
 pub(super) enum Format {
     Png,

@@ -1,7 +1,7 @@
 //! Rendered images and their files.
 
 pub(crate) mod channels;
-#[cfg(feature = "codecs")]
+#[cfg(feature = "golden")]
 pub(crate) mod described;
 #[cfg(feature = "codecs")]
 mod exr;
@@ -22,6 +22,8 @@ mod save;
 use format::Format;
 #[cfg(feature = "codecs")]
 pub use format::ImageError;
+#[cfg(feature = "golden")]
+pub(crate) use format::MAX_TEXT;
 pub use pixels::Image;
 #[cfg(feature = "codecs")]
 pub use png::PngDepth;

@@ -5,7 +5,9 @@ use std::io::Cursor;
 use ::png::{BitDepth, ColorType, Compression, Decoder, DecodingError, Encoder, EncodingError, Transformations};
 
 use super::Image;
-use super::described::{KEYWORD, MAX_TEXT};
+use super::format::KEYWORD;
+#[cfg(feature = "golden")]
+use super::format::MAX_TEXT;
 
 /// Bits per channel of a PNG file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -44,6 +46,7 @@ pub(super) fn encode(image: &Image, depth: PngDepth, text: Option<&str>) -> Resu
 }
 
 /// The text that describes a file, before its pixels or behind them, where other programs may put it.
+#[cfg(feature = "golden")]
 pub(super) fn text(bytes: &[u8]) -> Result<Option<String>, DecodingError> {
     let mut reader = Decoder::new(Cursor::new(bytes)).read_info()?;
     let find = |reader: &::png::Reader<Cursor<&[u8]>>| {

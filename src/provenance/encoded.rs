@@ -5,8 +5,8 @@ use std::path::Path;
 use super::names::Names;
 use super::sources::Sources;
 use super::text::Provenance;
-use crate::image::described::{Kind, MAX_TEXT};
-use crate::image::{Image, ImageError, PngDepth};
+use crate::image::described::Kind;
+use crate::image::{Image, ImageError, MAX_TEXT, PngDepth};
 use crate::scene::{Scene, SceneError};
 use crate::stats::Stats;
 

@@ -1,11 +1,16 @@
 //! Some pixels of a picture beside the f64 evaluation of the same scene.
 
 use std::fmt::{self, Display, Formatter};
+use std::sync::Arc;
 
 use crate::error::RenderError;
-use crate::headless::reference;
+use crate::error::setting::SettingError;
+use crate::finished::FinishedScene;
 use crate::image::Image;
+use crate::part::{self, Identity};
+use crate::reference::{self, Lights};
 use crate::scene::{OpenVolume, Scene};
+use crate::settings::window::{Region, Window};
 
 /// How far pixels of a picture are from the f64 evaluation.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +31,7 @@ impl Deviation {
     pub(super) fn of(volume: &OpenVolume, scene: &Scene, picture: &Image, count: u32) -> Result<Self, RenderError> {
         let size = [picture.width, picture.height];
         let chosen: Vec<[u32; 2]> = (0..count).map(|number| chosen(number, size)).collect();
-        let exact = reference::pixels(volume, scene, &chosen)?;
+        let exact = pixels(volume, scene, &chosen)?;
         let mut deviation = Self { pixels: count, largest: 0.0, at: [0, 0] };
         for (at, exact) in chosen.into_iter().zip(exact) {
             let drawn = picture.pixels[at[1] as usize * size[0] as usize + at[0] as usize];
@@ -40,6 +45,35 @@ impl Deviation {
         }
         Ok(deviation)
     }
+}
+
+/// Pixels of a scene's image by the f64 evaluation, given by their columns and rows. Each by itself takes a fraction of the whole image's time, except where
+/// a scene's image has no parts, or its parts need more than their pixels.
+///
+/// # Errors
+/// If the volume is streamed, or the scene needs more than can be computed.
+fn pixels(volume: &OpenVolume, scene: &Scene, at: &[[u32; 2]]) -> Result<Vec<[f32; 4]>, RenderError> {
+    let OpenVolume::Whole(whole) = volume else {
+        return Err(SettingError::new("volume", "one that is streamed", "one that fits into memory").into());
+    };
+    let finished = FinishedScene::new(whole, scene)?;
+    let FinishedScene { scene, transfer } = &finished;
+    let window = Window::whole(finished.size());
+    let (framed, view) = finished.framed(whole, whole.grid())?;
+    let identity = Identity::of((volume, scene), &view)?;
+    let is_parted = part::check(whole, scene, &window).is_ok() && !part::adds_up(whole, scene);
+    if !is_parted || identity.notes_labels() {
+        let Image { width, pixels, .. } = reference::render(whole, transfer, scene)?;
+        return Ok(at.iter().map(|[x, y]| pixels[(y * width + x) as usize]).collect());
+    }
+    let lights = Arc::new(Lights::new(whole, transfer, &framed)?);
+    let slabs = view.slabs_of(whole.grid());
+    let pixel = |&[x, y]: &[u32; 2]| {
+        let window = Window { region: Region { x, y, width: 1, height: 1 }, ..window.clone() };
+        let content = reference::part(whole, transfer, (scene, Some(&lights)), &window.opened(&slabs))?;
+        Ok(part::resolved(content.into(), &identity).first().copied().unwrap_or_default())
+    };
+    at.iter().map(pixel).collect()
 }
 
 /// A pixel by its number in a sequence that looks random and is the same everywhere.

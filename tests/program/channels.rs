@@ -38,7 +38,7 @@ const TWO_TABLES: &str = "
 fn saved_time_series_of_several_channels_turn_and_are_swept() {
     let folder = Folder::new();
     let run =
-        folder.run(&format!("orbit {IMAGEJ} {LOOK} --set camera.direction=[0,1,0] --time 0..3 --turn 60 --count 3 -o a%d.png --save-scene s.toml"));
+        folder.run(&format!("orbit {IMAGEJ} {LOOK} --set camera.direction=[0,1,0] --time 0..3 --turn 60 --count 3 --no-metadata -o a%d.png --save-scene s.toml"));
     run.assert_success();
     let frames: BTreeSet<Vec<u8>> = (0..3).map(|frame| folder.read(&format!("a{frame}.png"))).collect();
     assert_eq!(frames.len(), 3, "all times differ");
@@ -46,7 +46,8 @@ fn saved_time_series_of_several_channels_turn_and_are_swept() {
     assert_eq!((saved.matches("[[channel]]").count(), saved.matches("path = ").count()), (2, 1), "{saved}");
     folder.write("two.toml", TWO_TABLES.replace("FILE", IMAGEJ));
     for scene in ["s.toml", "two.toml"] {
-        let run = folder.run(&format!("orbit {scene} --backend cpu --time 0..3 --turn 60 --count 3 -o b%d.png"));
+        let run = folder
+            .run(&format!("orbit {scene} --backend cpu --time 0..3 --turn 60 --count 3 --no-metadata -o b%d.png"));
         run.assert_success();
         for frame in 0..3 {
             let [first, second] = ["a", "b"].map(|name| folder.read(&format!("{name}{frame}.png")));
@@ -78,8 +79,9 @@ fn saved_time_series_of_several_channels_turn_and_are_swept() {
             .assert_failure(2, &["--time: found 1..4, allowed: within 0..3, the times of"]);
     }
     // The level of one file, and its spacing, are those of all of its channels too.
-    folder.render("two.toml --backend cpu --spacing 1,2,3 -o two.png");
-    let run = folder.run("render two.toml --backend cpu --set channel[0].volume.spacing=[1,2,3] -o no.png");
+    folder.render("two.toml --backend cpu --spacing 1,2,3 --no-metadata -o two.png");
+    let run =
+        folder.run("render two.toml --backend cpu --set channel[0].volume.spacing=[1,2,3] --no-metadata -o no.png");
     run.assert_success();
     assert!(run.stderr.contains("channel[1].volume: resampled from [5, 4, 3] to [5, 4, 3] voxels"), "{}", run.stderr);
     assert!(folder.read("two.png") != folder.read("no.png"));
@@ -88,10 +90,10 @@ fn saved_time_series_of_several_channels_turn_and_are_swept() {
 #[test]
 fn one_channel_is_chosen() {
     let folder = Folder::new();
-    folder.render(&format!("{IMAGEJ} {LOOK} -o both.png --save-scene s.toml"));
+    folder.render(&format!("{IMAGEJ} {LOOK} --no-metadata -o both.png --save-scene s.toml"));
     let both = folder.read("both.png");
     let of = |arguments: &str| {
-        folder.render(&format!("{arguments} --backend cpu -o one.png"));
+        folder.render(&format!("{arguments} --backend cpu --no-metadata -o one.png"));
         folder.read("one.png")
     };
     assert!(of("s.toml") == both);

@@ -33,8 +33,8 @@ fn pictures_of_one_head_are_the_same() {
     assert!(!shown.is_empty() && shown.iter().all(|at| at % width < width / 2), "{shown:?}");
     // Words at the edges, and a saved scene.
     let annotated = |name: &str| {
-        let rest =
-            "--view front --annotate sides --save-scene saved.toml -o out.png --set image={width=240,height=200}";
+        let rest = "--view front --annotate sides --save-scene saved.toml -o out.png --no-metadata \
+                    --set image={width=240,height=200}";
         folder.render(&format!("{} --backend cpu {rest}", fixture(name)));
         let saved = String::from_utf8(folder.read("saved.toml")).unwrap();
         folder.render("saved.toml --backend cpu -o again.png");

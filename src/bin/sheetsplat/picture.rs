@@ -4,13 +4,12 @@ use std::cell::{OnceCell, RefCell};
 use std::path::{Path, PathBuf};
 
 use sheetsplat::headless::Backend;
-use sheetsplat::image::{Image, ImageError};
+use sheetsplat::image::{Image, ImageError, PngDepth};
 use sheetsplat::provenance::{Provenance, Sources};
 use sheetsplat::scene::{OpenVolume, Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
 use sheetsplat::volume::{Inputs, ReadOptions};
 
-use crate::arguments::Depth;
 use crate::failure::Failure;
 use crate::stdin;
 
@@ -136,13 +135,13 @@ impl Metadata {
     pub(crate) fn encode(
         &self,
         image: &Image,
-        (path, depth): (&Path, Depth),
+        (path, depth): (&Path, PngDepth),
         told: Option<Told<'_>>,
     ) -> Result<Vec<u8>, Failure> {
         let Some(Told { scene, sources, stats, annotate }) = told.filter(|_| !self.no_metadata) else {
-            return Ok(image.encode(path, depth.into())?);
+            return Ok(image.encode(path, depth)?);
         };
         let made = Provenance::of(path, &named(scene), sources, stats, annotate)?;
-        Ok(made.encode(image, path, depth.into())?)
+        Ok(made.encode(image, path, depth)?)
     }
 }

@@ -104,7 +104,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
             let sources = arguments.metadata.sources(&input.picture, (&volume, &whole))?;
             let told =
                 sources.as_ref().map(|sources| Told { scene: &whole, sources, stats: &stats, annotate: words.names() });
-            (arguments.metadata.encode(&image, (output, arguments.depth), told)?, stats)
+            (arguments.metadata.encode(&image, (output, arguments.depth.into()), told)?, stats)
         }
     };
     drop(bar);

@@ -124,7 +124,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let (shown, volume) = Shown::load(arguments, (scene, times), &outputs, true)?;
     shown.draw(arguments, (volume, &frames), progress, is_kept, |frame, shown, (image, told)| {
         let path = pattern.path(frame);
-        let bytes = arguments.metadata.encode(image, (&path, arguments.depth), told)?;
+        let bytes = arguments.metadata.encode(image, (&path, arguments.depth.into()), told)?;
         outputs::write(&[(&path, bytes.clone())], &[])?;
         made.add(shown, &bytes).map_err(outputs::failed(made.path()))
     })?;
