@@ -170,7 +170,7 @@ class Image:
 
         A PNG or EXR file of a picture that was drawn in this process tells how: the scene, the version, the backend, and
         hashes of the pixels and of the files that were read, or of the values of a volume from memory that is still there.
-        It names no folder outside its own. `sheetsplat.verify` draws it again.
+        No folder outside its own is named. `sheetsplat.verify` draws it again.
 
         Parameters
         ----------

@@ -134,7 +134,7 @@ class Scene:
         Returns
         -------
         Scene
-            The scene. It draws the same picture by the same backend, without the words beside it.
+            The scene, which draws the same picture by the same backend, without the words beside it.
 
         Raises
         ------

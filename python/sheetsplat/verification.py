@@ -16,7 +16,7 @@ __all__ = ["Verification", "verify"]
 
 @dataclass(frozen=True)
 class Verification:
-    """What `verify` found of a picture. It is true if the picture is the same.
+    """The finding of `verify`, which is true if the picture is the same.
 
     Attributes
     ----------

@@ -17,7 +17,7 @@ use crate::process::detached;
 use crate::scene::Scene;
 use crate::volume::Volume;
 
-/// How a picture was made. What its volume was read from is looked at when the picture is saved: most pictures never are.
+/// How a picture was made. The files of its volume are looked at when the picture is saved: most pictures never are.
 #[pyclass(frozen, module = "sheetsplat._native")]
 pub(crate) struct Provenance {
     pub(crate) scene: sheetsplat::Scene,
@@ -30,7 +30,7 @@ pub(crate) struct Provenance {
     pub(crate) known: Known,
 }
 
-/// What a volume was read from, once it is known.
+/// The files and values behind a volume, once they are known.
 pub(crate) type Known = Arc<Mutex<Option<Sources>>>;
 
 /// The volume that was drawn, which a picture does not keep in memory.
@@ -62,7 +62,7 @@ impl Provenance {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         let sources = match &*known {
             Some(sources) => sources,
-            None => known.insert(Sources::of(volume.as_ref(), &self.scene, &self.inputs)?),
+            None => known.insert(Sources::of(volume.as_ref(), &self.scene, &self.inputs)),
         };
         let scene = volume.map_or_else(|| self.scene.clone(), |volume| self.scene.explicit(volume.sample()));
         let whole = self.layout.as_ref().map_or_else(|| scene.clone(), |layout| layout.whole(&scene));

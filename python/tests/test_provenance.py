@@ -49,6 +49,12 @@ def test_pictures_of_files_are_the_same(tmp_path: Path) -> None:
     write(tmp_path / "a.npy", changed)
     found = verify(tmp_path / "a.png")
     assert not found and "the file a.npy was changed" in found.reasons
+    # A file that is gone before the picture is saved.
+    image = sheetsplat.render(tmp_path / "times.npy", image=SIZE)
+    os.remove(tmp_path / "times.npy")
+    image.save(tmp_path / "gone.png")
+    with pytest.raises(sheetsplat.ImageError, match="no file times.npy"):
+        verify(tmp_path / "gone.png")
     # Labels of an array lie in no file.
     sheetsplat.render(tmp_path / "a.npy", labels=labels, image=SIZE).save(tmp_path / "labels.png")
     with pytest.raises(sheetsplat.ImageError, match="its volume came from memory"):

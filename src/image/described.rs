@@ -7,7 +7,7 @@ use super::open::{content, of_volume, read};
 use super::{Image, ImageError, PngDepth, exr, png};
 use crate::volume::{Access, ReadOptions};
 
-/// What the pixels of a file are.
+/// How a file holds its pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Kind {
     /// Integers with straight alpha.
@@ -17,7 +17,7 @@ pub(crate) enum Kind {
 }
 
 impl Kind {
-    /// That of a file with room for a text; `None` without such room.
+    /// The kind of a file with room for a text; `None` without such room.
     pub(crate) fn of(path: &Path, depth: PngDepth) -> Result<Option<Self>, ImageError> {
         Ok(match Format::of(path)? {
             Format::Png => Some(Self::Png(depth)),

@@ -24,7 +24,7 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// That of `count` pixels of a scene's picture, without words, chosen by a fixed sequence.
+    /// The deviation of `count` pixels of a scene's picture, without words, chosen by a fixed sequence.
     ///
     /// # Errors
     /// If the volume is streamed, or the scene needs more than the f64 evaluation can compute.

@@ -5,17 +5,23 @@ use std::path::{Path, PathBuf};
 use super::names::{files_of, is_kept};
 use super::sources::hash_of;
 use super::text::Provenance;
+use crate::image::open::of_volume;
 use crate::image::{ImageError, described};
-use crate::scene::{Scene, SceneError, VolumeSource};
-use crate::volume::{ReadOptions, archive_and_inner, is_address, written_in};
+use crate::scene::{Scene, SceneError, VolumeSource, reserve_text};
+use crate::volume::{Access, ReadOptions, archive_and_inner, is_address, written_in};
 
 impl Provenance {
     /// Reads how a picture was made; `None` if its file does not tell.
     ///
     /// # Errors
-    /// If the file cannot be read, is no PNG, EXR or NPY file, or its text is too long, damaged, or of another version's format.
+    /// If the file cannot be read, is no PNG, EXR or NPY file, its text is too long, damaged, or of another version's format, or the scene takes more memory
+    /// than the options allow.
     pub fn open(path: &Path, options: &ReadOptions) -> Result<Option<Self>, ImageError> {
-        described::text(path, options)?.map(|text| Self::from_json(path, &text)).transpose()
+        let Some(text) = described::text(path, options)? else { return Ok(None) };
+        let read = Self::from_json(path, &text)?;
+        let access = Access::new(options).map_err(of_volume)?;
+        reserve_text(path, read.scene.len(), &access).map_err(of_volume)?;
+        Ok(Some(read))
     }
 
     /// The scene of a picture, and `--set` overrides over it. Its files are looked for in the picture's folder and then in other folders, by their paths and

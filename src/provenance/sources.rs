@@ -1,4 +1,4 @@
-//! What a picture's volume was read from: hashes of files that were read whole, and of values where the files were read in pieces or there are none.
+//! The files and values behind a picture's volume: hashes of files that were read whole, and of values where the files were read in pieces or there are none.
 
 use std::fs::File;
 use std::io::{self, Read};
@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 
 use super::names::{Names, files_of};
 use super::text::SourceFile;
-use crate::image::ImageError;
 use crate::part::fingerprint;
 use crate::scene::{OpenVolume, Scene, VolumeSource};
 use crate::volume::{Inputs, archive_and_inner, is_address};
@@ -19,7 +18,7 @@ const BYTES_OF_HEADER: u64 = 16 << 20;
 /// Archives of stores, of which chunks are read.
 const ARCHIVES: [&str; 2] = ["zip", "ozx"];
 
-/// What a volume was read from.
+/// The files and values behind a volume.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sources {
     /// Files and stores, with the hashes of those that were read whole.
@@ -29,16 +28,13 @@ pub struct Sources {
 }
 
 impl Sources {
-    /// Those of a scene's volume, given the files that were read for it ([`ReadOptions::noted_in`](crate::volume::ReadOptions::noted_in)). Without the volume,
-    /// where a host has it no more, values stay unknown that no file's hash tells.
-    ///
-    /// # Errors
-    /// If a file cannot be read once more.
-    pub fn of(volume: Option<&OpenVolume>, scene: &Scene, inputs: &Inputs) -> Result<Self, ImageError> {
+    /// The sources of a scene's volume, given the files that were read for it ([`ReadOptions::noted_in`](crate::volume::ReadOptions::noted_in)). Without the volume,
+    /// where a host has it no more, values stay unknown that no file's hash tells. A file that cannot be read once more has no hash, and then values have.
+    pub fn of(volume: Option<&OpenVolume>, scene: &Scene, inputs: &Inputs) -> Self {
         let named = files_of(scene);
         if let Some(volume @ OpenVolume::Streamed(_)) = volume {
             let files = named.into_iter().map(|path| (path, None)).collect();
-            return Ok(Self { files, values: fingerprint::of_channels(volume), is_streamed: true });
+            return Self { files, values: fingerprint::of_channels(volume), is_streamed: true };
         }
         let most = volume.map_or(u64::MAX, |volume| {
             let voxels = volume.grid().voxels().saturating_mul(volume.sample().channel_count() as u64);
@@ -46,7 +42,7 @@ impl Sources {
         });
         let mut files = Vec::new();
         for path in inputs.files() {
-            let hash = hash_up_to(&path, most).map_err(|source| ImageError::Io { path: path.clone(), source })?;
+            let hash = hash_up_to(&path, most).unwrap_or_default();
             files.push((path, hash));
         }
         files.extend(inputs.folders().into_iter().map(|path| (path, None)));
@@ -54,7 +50,7 @@ impl Sources {
         let is_builtin = matches!(scene.channels.first().volume, VolumeSource::Builtin(_));
         let are_known = files.iter().all(|(_, hash)| hash.is_some()) && (is_builtin || !files.is_empty());
         let values = volume.filter(|_| !are_known).map_or_else(Vec::new, fingerprint::of_channels);
-        Ok(Self { files, values, is_streamed: false })
+        Self { files, values, is_streamed: false }
     }
 
     /// The files by their names in a picture's text, sorted: threads open the files of a folder in any order.

@@ -82,7 +82,7 @@ impl Provenance {
         &self.version
     }
 
-    /// What drew it: `gpu`, `cpu` or `reference`.
+    /// The backend that drew it: `gpu`, `cpu` or `reference`.
     pub fn backend(&self) -> &str {
         &self.backend
     }
@@ -184,7 +184,7 @@ impl Display for Provenance {
                 "file",
                 &format!(
                     "{path}, {}",
-                    blake3.as_deref().map_or("read in pieces".to_owned(), |hash| format!("blake3 {hash}"))
+                    blake3.as_deref().map_or("without a hash".to_owned(), |hash| format!("blake3 {hash}"))
                 ),
             )?;
         }

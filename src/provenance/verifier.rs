@@ -31,7 +31,7 @@ use crate::volume::{Inputs, ReadOptions};
 /// let scene = scene.explicit(volume.sample());
 /// let headless = Headless::new(&HeadlessOptions::default().with_backend(Backend::Cpu))?;
 /// let drawn = headless.render_volume(volume.clone(), &scene)?;
-/// let sources = Sources::of(Some(&volume), &scene, &Inputs::default())?;
+/// let sources = Sources::of(Some(&volume), &scene, &Inputs::default());
 /// let provenance = Provenance::of(&path, &scene, &sources, &drawn.stats, &[])?;
 /// std::fs::write(&path, provenance.encode(&drawn.image, &path, PngDepth::Eight)?)?;
 ///
@@ -46,11 +46,11 @@ pub struct Verifier {
     volume: Option<OpenVolume>,
     oracle: u32,
     any_version: bool,
-    /// What draws, by its backend and its adapter's name.
+    /// Renderers, by their backend and their adapter's name.
     opened: Vec<(Backend, Option<String>, Headless)>,
 }
 
-/// What verifying a picture found.
+/// The finding about a picture.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Verified {
@@ -136,7 +136,7 @@ impl Verifier {
         }
     }
 
-    /// The image that a picture's text describes, what drew it, and its deviation. What the volume was read from is compared.
+    /// The image that a picture's text describes, what drew it, and its deviation. The files and values behind the volume are compared.
     fn draw_again(
         &mut self,
         path: &Path,
@@ -153,7 +153,7 @@ impl Verifier {
             }
             None => scene.open_volume_with(&self.options.clone().noted_in(&inputs)).map_err(|error| told(&error))?,
         };
-        let sources = Sources::of(Some(&volume), &scene, &inputs).map_err(|error| told(&error))?;
+        let sources = Sources::of(Some(&volume), &scene, &inputs);
         reasons.extend(changed_sources(made, &sources, &Names::new(path, &scene)));
         let (words, scene) = worded(&made.annotate, &scene, &volume)?;
         let headless = self.headless(made, &scene)?;
@@ -164,7 +164,7 @@ impl Verifier {
         Ok((image, drawn, deviation.map_err(|error| format!("--oracle: {error}"))?))
     }
 
-    /// What draws a picture again.
+    /// The renderer that draws a picture again.
     fn headless(&mut self, made: &Provenance, scene: &Scene) -> Result<&Headless, String> {
         let backend: Backend = made.backend.parse()?;
         let adapter = made.adapter.clone();

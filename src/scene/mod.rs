@@ -68,10 +68,7 @@ impl Scene {
     pub fn open_with(path: &Path, sets: &[String], options: &ReadOptions) -> Result<Self, SceneError> {
         let access = Access::new(options)?;
         let text = access.text(path, MAX_TEXT)?.map_err(|source| SceneError::Io { path: path.to_owned(), source })?;
-        let length = text.len() as u64;
-        if length > SMALL_TEXT {
-            access.reserve(path, "size", format_args!("{length} bytes of a scene"), length * PER_BYTE)?;
-        }
+        reserve_text(path, text.len(), &access)?;
         Self::parse(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")), sets)
     }
 
@@ -354,6 +351,18 @@ const PER_BYTE: u64 = 128;
 
 /// The length of a text whose memory is not counted.
 const SMALL_TEXT: u64 = 16 << 10;
+
+/// Reserves the memory that reading the text of a scene takes.
+///
+/// # Errors
+/// If it exceeds the memory limit.
+pub(crate) fn reserve_text(path: &Path, length: usize, access: &Access) -> Result<(), VolumeError> {
+    let length = length as u64;
+    if length <= SMALL_TEXT {
+        return Ok(());
+    }
+    access.reserve(path, "size", format_args!("{length} bytes of a scene"), length.saturating_mul(PER_BYTE))
+}
 
 fn check_length(length: u64, origin: &str) -> Result<(), SceneError> {
     if length <= MAX_TEXT {

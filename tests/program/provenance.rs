@@ -3,7 +3,15 @@
 use std::io::{Cursor, Write};
 
 use serde_json::json;
+use sheetsplat::Volume;
+use sheetsplat::headless::{Backend, Headless, HeadlessOptions};
+use sheetsplat::image::PngDepth;
+use sheetsplat::provenance::{Provenance, Sources, Verifier};
+use sheetsplat::scene::OpenVolume;
+use sheetsplat::volume::Inputs;
 
+use crate::common::cases::cases;
+use crate::common::random_scene::Case;
 use crate::streaming::write_ball;
 use crate::*;
 
@@ -50,7 +58,7 @@ fn rewritten(bytes: &[u8], text: &str, change: impl FnOnce(&mut [u8])) -> Vec<u8
 /// A text with its hash.
 fn sealed(mut text: Value) -> String {
     text["check"] = json!("");
-    let made: sheetsplat::provenance::Provenance = serde_json::from_value(text.clone()).unwrap();
+    let made: Provenance = serde_json::from_value(text.clone()).unwrap();
     text["check"] = json!(blake3::hash(serde_json::to_string(&made).unwrap().as_bytes()).to_hex().to_string());
     text.to_string()
 }
@@ -234,7 +242,7 @@ fn volumes_that_are_read_in_pieces_are_told_by_their_values() {
     let run = folder.run_with(&memory, "", "verify ball.png --memory 17MiB");
     assert_eq!(run.code, Some(0), "{}{}", run.stdout, run.stderr);
 
-    // What no file holds is given by the host.
+    // A host gives what no file holds.
     let mut stdin = folder.command("render - --size 24x20 --backend cpu -o pipe.png");
     folder.write_small("b.nrrd");
     stdin.stdin(fs::File::open(folder.path("b.nrrd")).unwrap());
@@ -383,6 +391,11 @@ fn hostile_pictures_are_refused() {
     write(&" ".repeat(40 << 20));
     assert!(folder.read("b.png").len() < 1 << 20);
     folder.assert_unverified("b.png", 2, &["b.png: cannot be verified: "]);
+    // A scene that takes more memory than is allowed.
+    let mut long = text.clone();
+    long["scene"] = json!(format!("{scene}\n# {}", "x".repeat(1 << 20)));
+    write(&sealed(long));
+    folder.assert_unverified("b.png --memory 100MiB", 2, &["1048", "bytes of a scene", "memory limit"]);
     folder.write("short.png", &picture[..picture.len() / 2]);
     folder.assert_unverified("short.png", 2, &["short.png: cannot be verified: "]);
     folder.assert_unverified("gone.png", 2, &["gone.png: cannot be verified: ", "No such file"]);
@@ -411,4 +424,51 @@ fn pictures_of_a_gpu_are_compared_on_its_adapter() {
     text["adapter"] = json!("Voodoo 2");
     folder.write("b.png", rewritten(&picture, &sealed(text), |_| {}));
     folder.assert_unverified("b.png", 2, &["it was drawn on Voodoo 2, which is not here"]);
+}
+
+/// Every key of a scene survives in the text, to the last bit, and a voxel, a key or a version that is another one is told.
+#[test]
+fn random_scenes_are_the_same_when_they_are_drawn_again() {
+    let folder = Folder::new();
+    let headless = Headless::new(&HeadlessOptions::default().with_backend(Backend::Cpu)).unwrap();
+    let (mut verified, mut changed) = (0, 0);
+    for seed in 0..cases(100, 1000) as u64 {
+        let Case { volume, scene, .. } = Case::new(seed, seed);
+        let volume = OpenVolume::from(volume);
+        let scene = scene.explicit(volume.sample());
+        // Some settings are the GPU's alone.
+        let Ok(drawn) = headless.render_volume(volume.clone(), &scene) else { continue };
+        let path = folder.path(["a.png", "a.exr"][seed as usize % 2]);
+        let sources = Sources::of(Some(&volume), &scene, &Inputs::default());
+        let made = Provenance::of(&path, &scene, &sources, &drawn.stats, &[]).unwrap();
+        let write = |made: &Provenance| {
+            fs::write(&path, made.encode(&drawn.image, &path, PngDepth::Sixteen).unwrap()).unwrap();
+        };
+        let with = |key: &str, value: Value| {
+            let mut text: Value = serde_json::from_str(&made.to_json().unwrap()).unwrap();
+            text[key] = value;
+            write(&serde_json::from_value(text).unwrap());
+        };
+        let reasons = |volume: &OpenVolume| {
+            Verifier::default().with_volume(volume.clone()).verify(&path).unwrap().reasons.join("\n")
+        };
+        write(&made);
+        assert_eq!(reasons(&volume), "", "{seed}: {}", made.scene_text());
+        let whole = volume.sample();
+        if whole.channel_count() == 1 && whole.labels().is_none() && whole.colors().is_none() {
+            let mut values: Vec<f32> = whole.values().iter().collect();
+            let at = seed as usize % values.len();
+            values[at] = if values[at].is_finite() { values[at] + 1.0 } else { 0.0 };
+            let other = Volume::new("other", whole.dims(), whole.grid().spacing, values).unwrap();
+            let told = reasons(&other.into());
+            assert!(told.contains("the values of channel 0 were changed"), "{seed}: {told}");
+            changed += 1;
+        }
+        with("version", json!("0.0.1"));
+        assert!(reasons(&volume).starts_with("another version: it was drawn by 0.0.1"), "{seed}");
+        with("scene", json!(made.scene_text().replacen("\nwidth = ", "\nwidth = 1", 1)));
+        assert!(reasons(&volume).contains(" pixels, and "), "{seed}: {}", reasons(&volume));
+        verified += 1;
+    }
+    assert!(verified > 60 && changed > 30, "{verified} scenes, {changed} voxels");
 }

@@ -4,7 +4,7 @@ use std::cell::{OnceCell, RefCell};
 use std::path::{Path, PathBuf};
 
 use sheetsplat::headless::Backend;
-use sheetsplat::image::{Image, ImageError, PngDepth};
+use sheetsplat::image::{Image, PngDepth};
 use sheetsplat::provenance::{Provenance, Sources};
 use sheetsplat::scene::{OpenVolume, Scene, SceneError, VolumeSource};
 use sheetsplat::stats::Stats;
@@ -78,8 +78,8 @@ impl Picture {
         inputs
     }
 
-    /// What the volume that was opened last was read from.
-    pub(crate) fn sources(&self, volume: &OpenVolume, scene: &Scene) -> Result<Sources, ImageError> {
+    /// The files and values behind the volume that was opened last.
+    pub(crate) fn sources(&self, volume: &OpenVolume, scene: &Scene) -> Sources {
         Sources::of(Some(volume), &named(scene), &self.inputs.borrow())
     }
 }
@@ -103,9 +103,9 @@ pub(crate) struct Metadata {
     no_metadata: bool,
 }
 
-/// What a picture tells beside its pixels.
+/// The text of a picture, beside its pixels.
 pub(crate) struct Told<'a> {
-    /// That of the whole image, with everything stated.
+    /// The scene of the whole image, with everything stated.
     pub(crate) scene: &'a Scene,
     pub(crate) sources: &'a Sources,
     pub(crate) stats: &'a Stats,
@@ -119,16 +119,9 @@ impl Metadata {
         self.no_metadata
     }
 
-    /// What a volume was read from, if pictures are to tell it.
-    pub(crate) fn sources(
-        &self,
-        picture: &Picture,
-        (volume, scene): (&OpenVolume, &Scene),
-    ) -> Result<Option<Sources>, Failure> {
-        match self.no_metadata {
-            true => Ok(None),
-            false => Ok(Some(picture.sources(volume, scene)?)),
-        }
+    /// The files and values behind a volume, if pictures are to tell it.
+    pub(crate) fn sources(&self, picture: &Picture, (volume, scene): (&OpenVolume, &Scene)) -> Option<Sources> {
+        (!self.no_metadata).then(|| picture.sources(volume, scene))
     }
 
     /// The bytes of a picture's file.

@@ -101,7 +101,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
             stats.prepare_ms += view_ms;
             let image = words.draw(image, &scene, volume.sample());
             let whole = words.whole(&scene);
-            let sources = arguments.metadata.sources(&input.picture, (&volume, &whole))?;
+            let sources = arguments.metadata.sources(&input.picture, (&volume, &whole));
             let told =
                 sources.as_ref().map(|sources| Told { scene: &whole, sources, stats: &stats, annotate: words.names() });
             (arguments.metadata.encode(&image, (output, arguments.depth.into()), told)?, stats)

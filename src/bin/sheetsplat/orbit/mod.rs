@@ -237,10 +237,9 @@ impl<'a> Shown<'a> {
         Ok(hash)
     }
 
-    /// What the volume of frames that are pictures was read from, if they are to tell it.
-    fn sources(&self, arguments: &Arguments, volume: &OpenVolume, scene: &Scene) -> Result<Option<Sources>, Failure> {
-        let sources = || arguments.metadata.sources(&arguments.input.picture, (volume, scene));
-        if self.is_resumed { sources() } else { Ok(None) }
+    /// The files behind the volume of frames that are pictures, if they are to tell it.
+    fn sources(&self, arguments: &Arguments, volume: &OpenVolume, scene: &Scene) -> Option<Sources> {
+        self.is_resumed.then(|| arguments.metadata.sources(&arguments.input.picture, (volume, scene))).flatten()
     }
 
     /// Draws frames and passes them on, except those that are kept, given the hash of what they show. Each is independent of the others. No more than one
@@ -265,7 +264,7 @@ impl<'a> Shown<'a> {
         }
         let mut current = Current { time: scene.channels.first().time, ..Current::new(scene.clone()) };
         current.hash = self.hash(&volume, *depth)?;
-        current.sources = self.sources(arguments, &volume, scene)?;
+        current.sources = self.sources(arguments, &volume, scene);
         current.volume = Some(progress.watch(volume));
         let mut headless = None;
         for &frame in frames {
@@ -274,7 +273,7 @@ impl<'a> Shown<'a> {
                 current = Current { time: Some(time), ..Current::new(at_time(scene, time)) };
                 let volume = input.read_volume(&current.scene, self.outputs)?;
                 current.hash = self.hash(&volume, *depth)?;
-                current.sources = self.sources(arguments, &volume, &current.scene)?;
+                current.sources = self.sources(arguments, &volume, &current.scene);
                 current.volume = Some(progress.watch(volume));
             }
             let shown = current.shown(angle(frame));
@@ -320,7 +319,7 @@ struct Current {
     time: Option<u32>,
     /// The scene at this time.
     scene: Scene,
-    /// What its volume was read from, if frames tell it.
+    /// The files behind its volume, if frames tell it.
     sources: Option<Sources>,
     /// Before a frame of it is drawn.
     volume: Option<OpenVolume>,
