@@ -87,7 +87,10 @@ fn chosen(number: u32, [width, height]: [u32; 2]) -> [u32; 2] {
 impl Display for Deviation {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { pixels, largest, at: [x, y] } = self;
-        write!(f, "{pixels} pixels differ from the f64 evaluation by at most {largest:.2e} of 255, at x {x}, y {y}")
+        write!(f, "{pixels} pixels differ from the f64 evaluation by at most ")?;
+        // Rounding alone is far below a hundredth.
+        if *largest < 0.01 { write!(f, "{largest:.1e}") } else { write!(f, "{largest:.2}") }?;
+        write!(f, " of 255, at x {x}, y {y}")
     }
 }
 
