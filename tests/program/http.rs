@@ -58,6 +58,13 @@ fn a_store_at_an_address_is_drawn_like_one_on_disk() {
         run.stderr
     );
 
+    // Nor does a picture, which is drawn again from the address.
+    folder.render(&format!("{} --backend cpu --size 20 -o told.exr", with("files/ball.zarr")));
+    let run = folder.run("info told.exr");
+    assert!(run.stdout.contains(&format!("path = \"{address}\"")) && !run.stdout.contains("secret"), "{}", run.stdout);
+    let run = folder.run("verify told.exr");
+    assert!(run.code == Some(0) && run.stdout.contains("the same pixels"), "{}{}", run.stdout, run.stderr);
+
     server.take_requests();
     folder
         .run("render scene.toml --confine . -o no.png")
