@@ -18,7 +18,7 @@ __all__ = ["Verification", "verify"]
 class Verification:
     """The finding of `verify`, which is true if the picture is the same.
 
-    Attributes
+    Parameters
     ----------
     path : str
         The picture.

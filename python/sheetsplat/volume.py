@@ -233,7 +233,7 @@ class Volume:
         if origin.spacing is not None:
             keys["volume.spacing"] = list(reversed(origin.spacing))
         if not isinstance(origin.what, str):
-            stated = origin.what._bare
+            stated: native.Scene = origin.what._bare
             return stated.replaced(keys | {"volume.level": self.level} if self.level > 0 else keys)
         if origin.what.startswith(_BUILTIN):
             keys["volume.builtin"] = origin.what.removeprefix(_BUILTIN)
