@@ -328,6 +328,10 @@ fn a_picture_is_a_scene_to_go_on_from() {
     folder.render("a.png -o wide.png --set image.width=200");
     assert_eq!(decoded(&folder.read("wide.png")).0.width, 200);
     folder.assert_verified("wide.png");
+    // Data has no words.
+    folder.render("a.png -o data.exr");
+    folder.render("saved.toml --backend cpu -o plain.exr");
+    assert!(folder.read("data.exr") == folder.read("plain.exr"));
     folder.run("render a.png -o a.png").assert_failure(2, &["a.png", "allowed: another file"]);
     folder.run("render a.png -o b.png --set camera.zoom=2").assert_failure(2, &["camera.zoom", "unknown key"]);
     let run = folder.run("info a.png");

@@ -62,14 +62,14 @@ impl Annotate {
     /// depends on the volume. `explicit` is as for [`Input::settled`].
     pub(crate) fn settled(
         &self,
-        input: &Input,
+        (input, output): (&Input, &Path),
         volume: &Volume,
         scene: &Scene,
         explicit: impl Fn(&Scene, &Volume) -> Scene,
     ) -> Result<(Words, Scene), Failure> {
         let scene = input.settled(volume, scene, |scene, _| scene.clone())?;
         let invalid = |error: SettingError| Failure::Input(format!("--{error}"));
-        let chosen = if self.is_empty() {
+        let chosen = if self.is_empty() && !is_data(output) {
             // A picture has the words that it had.
             input.picture.annotations().iter().map(|name| name.parse()).collect::<Result<_, _>>().map_err(invalid)?
         } else {
@@ -85,14 +85,18 @@ impl Annotate {
 
     /// Checks that the output is a picture to look at, not data.
     pub(crate) fn check_format(&self, output: &Path) -> Result<(), Failure> {
-        let is_data = |extension: &OsStr| ["exr", "npy"].iter().any(|data| extension.eq_ignore_ascii_case(data));
-        let is_data = output.extension().is_some_and(is_data);
-        if is_data && !self.annotate.is_empty() {
+        if is_data(output) && !self.annotate.is_empty() {
             let found = output.display();
             return Err(Failure::Input(format!("--annotate: found {found}, allowed: PNG files and movies")));
         }
         Ok(())
     }
+}
+
+/// Whether a file is no picture to look at: an image of floats, or a part of one.
+fn is_data(output: &Path) -> bool {
+    let extension = output.extension();
+    extension.is_some_and(|extension| ["exr", "npy", "npz"].iter().any(|data| extension.eq_ignore_ascii_case(data)))
 }
 
 impl Words {

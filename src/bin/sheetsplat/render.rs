@@ -73,7 +73,7 @@ pub(crate) fn run(arguments: &Arguments, progress: bool) -> Result<(), Failure> 
     let load_ms = start.elapsed().as_secs_f64() * 1e3;
     look::tell_choices(progress, &input.name, &scene, volume.sample());
     let start = Instant::now();
-    let (words, scene) = arguments.annotate.settled(input, volume.sample(), &scene, Scene::explicit)?;
+    let (words, scene) = arguments.annotate.settled((input, output), volume.sample(), &scene, Scene::explicit)?;
     let explicit_ms = start.elapsed().as_secs_f64() * 1e3;
     let window = arguments.part.window(&scene);
     // Like a frame of `orbit`, a part is drawn once.

@@ -210,7 +210,8 @@ impl<'a> Shown<'a> {
             let allowed = format!("within 0..{count}, the times of {}", input.name);
             return Err(Failure::Input(format!("--time: found {start}..{end}, allowed: {allowed}")));
         }
-        let (words, scene) = annotate.settled(input, volume.sample(), &scene, Scene::explicit_all_around)?;
+        let (words, scene) =
+            annotate.settled((input, &arguments.output), volume.sample(), &scene, Scene::explicit_all_around)?;
         let is_bare = arguments.metadata.is_bare();
         Ok((Self { scene, times, words, outputs, is_resumed, is_bare, light }, volume))
     }

@@ -157,7 +157,7 @@ fn draw(
             Some((_, volume)) => volume,
             None => input.open_volume(&scene, outputs)?,
         };
-        let (words, scene) = annotate.settled(input, volume.sample(), &scene, Scene::explicit)?;
+        let (words, scene) = annotate.settled((input, &arguments.output), volume.sample(), &scene, Scene::explicit)?;
         let rendering =
             headless.render_volume(progress.watch(volume.clone()), &scene).map_err(|error| input.failure(error))?;
         log_frame(&label.join(", "), &rendering.stats);
