@@ -21,7 +21,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), RenderError> {
     let splatting = &scene.splatting;
     let other = "or another backend than \"cpu\"";
     if let Some(economy) = splatting.experimental.in_use() {
-        return refused(economy.key, economy.value.to_string(), format!("{}, {other}", economy.off));
+        return refused(&economy.key, economy.value.to_string(), format!("{}, {other}", economy.off));
     }
     Ok(())
 }

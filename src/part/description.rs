@@ -13,7 +13,7 @@ use super::{Identity, Part};
 use crate::image::ImageError;
 use crate::image::channels::Joining;
 use crate::image::open::content;
-use crate::scene::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
+use crate::settings::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::settings::window::{Region, Window};
 

@@ -15,7 +15,7 @@ use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::scene::Scene;
 use crate::settings::clip::HalfSpace;
-use crate::settings::shading::Light;
+use crate::settings::light::Light;
 use crate::settings::splatting::Compositing;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Grid, Volume};

@@ -12,7 +12,7 @@ use crate::error::setting::scaled;
 use crate::lists::classify::channels;
 use crate::parallel::prelude::*;
 use crate::scene::Scene;
-use crate::settings::shading::Light;
+use crate::settings::light::Light;
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::Volume;
 

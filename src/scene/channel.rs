@@ -37,6 +37,13 @@ pub struct Channel {
     pub transfer: TransferSettings,
 }
 
+impl Default for Channel {
+    /// A channel of a volume in memory.
+    fn default() -> Self {
+        Self::new(VolumeSource::Memory)
+    }
+}
+
 impl Channel {
     /// A channel of a volume with every setting at its default.
     pub fn new(volume: VolumeSource) -> Self {

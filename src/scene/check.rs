@@ -2,26 +2,19 @@
 
 use super::{Channel, ImageSettings, Scene, TransferSettings};
 use crate::appearance::Colormap;
-use crate::error::setting::{Interval, SettingError};
+use crate::error::setting::SettingError;
+use crate::settings::key::Keyed;
 use crate::settings::transfer_function::{Parts, check_iso_ranges, check_labels, check_pieces, check_ramps};
 use crate::settings::{Classification, Gradient};
 use crate::volume::{Volume, check_spacing};
 
 impl ImageSettings {
-    /// The allowed widths and heights, for errors.
-    pub(super) const PIXELS: &str = "an integer from 1 to the device's texture limit";
-
     /// Checks that the values are in range.
     ///
     /// # Errors
     /// If width or height is 0, or the background is not in [0, 1].
     pub fn check(&self) -> Result<(), SettingError> {
-        for (key, pixels) in [("image.width", self.width), ("image.height", self.height)] {
-            if pixels == 0 {
-                return Err(SettingError::new(key, f64::from(pixels), Self::PIXELS));
-            }
-        }
-        Interval::SHARE.check_each("image.background", &self.background)
+        self.check_keys("image")
     }
 }
 

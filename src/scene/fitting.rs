@@ -63,6 +63,28 @@ impl Fitting {
         }
     }
 
+    /// The settings by their keys, which only one table has.
+    pub(super) fn keys(&mut self) -> [(&'static str, &mut bool); 11] {
+        [
+            ("enabled", &mut self.enabled),
+            ("ambient", &mut self.ambient),
+            ("diffuse", &mut self.diffuse),
+            ("specular", &mut self.specular),
+            ("shininess", &mut self.shininess),
+            ("light", &mut self.light),
+            ("occlusion", &mut self.occlusion),
+            ("shadow", &mut self.shadow),
+            ("light_step", &mut self.light_step),
+            ("compositing", &mut self.compositing),
+            ("shade_faces", &mut self.shade_faces),
+        ]
+    }
+
+    /// Whether a key is left to a preset.
+    pub(super) fn leaves(mut self, key: &str) -> bool {
+        self.keys().iter().any(|(name, is_open)| *name == key && **is_open)
+    }
+
     /// The shading, with a preset's where it is open.
     pub(super) fn shading(self, stated: Shading, preset: Preset) -> Shading {
         let (of_preset, default) = (preset.shading(), Shading::default());

@@ -8,14 +8,17 @@ mod definition;
 mod error;
 mod fitting;
 pub(crate) mod image_settings;
+mod keys;
 mod label_ramps;
 mod level;
 mod load;
-pub(crate) mod names;
 mod only;
 pub(crate) mod open;
 mod overrides;
 mod reader;
+#[cfg(feature = "cli")]
+mod schema;
+mod slots;
 mod source;
 mod tables;
 mod transfer_settings;
@@ -34,6 +37,8 @@ pub use fitting::Fitting;
 use fitting::is_builtin_head;
 pub use image_settings::ImageSettings;
 pub use open::OpenVolume;
+#[cfg(feature = "cli")]
+pub use schema::schema;
 pub use source::VolumeSource;
 pub use transfer_settings::TransferSettings;
 
@@ -47,6 +52,7 @@ use crate::settings::shading::Shading;
 use crate::settings::splatting::{Classification, Splatting};
 use crate::settings::transfer_function::TransferFunction;
 use crate::volume::{Access, Channels, ReadOptions, Store, Volume, VolumeError};
+use keys::Root;
 use overrides::apply_override;
 use reader::{OVERRIDE, Origins, Section};
 
@@ -302,10 +308,8 @@ impl Scene {
             root.section("shading")?,
             root.section("splatting")?,
         ];
-        let mut preset = None;
-        root.read("preset", &mut preset, |entry| entry.choice(&Preset::ALL).map(Some))?;
         // Unknown tables are reported first: a misspelt table best explains why keys seem to be missing.
-        root.finish()?;
+        let Root { preset } = root.filled(Root::default())?;
         let splatting_of_preset = Splatting {
             compositing: preset.map_or(Splatting::default().compositing, Preset::compositing),
             interpolation: preset.map_or(Splatting::default().interpolation, Preset::interpolation),
@@ -318,15 +322,15 @@ impl Scene {
         };
         let channels = tables::channels(channels, folder, source, preset)?;
         let is_open = preset.is_none() && !states_transfer && channels.len() <= 1;
-        let unstated = tables::fitting(&shading, &splatting, &clip);
+        let unstated = tables::fitting([&shading, &splatting, &clip]);
         let of_preset = Fitting { light_step: preset.is_some() && unstated.light_step, ..Fitting::NONE };
         let fitting = if is_open { unstated } else { of_preset };
         let scene = Self {
-            channels: Channels::of(channels).unwrap_or_else(|| Channel::new(VolumeSource::Memory).into()),
+            channels: Channels::of(channels).unwrap_or_else(|| Channel::default().into()),
             camera: tables::camera(camera, camera_by_default)?,
-            image: tables::image(image)?,
-            clip: tables::clip(clip, preset.map_or_else(Clip::default, Preset::clip))?,
-            shading: tables::shading(shading, preset.map_or_else(Shading::default, Preset::shading))?,
+            image: image.filled(ImageSettings::default())?,
+            clip: clip.filled(preset.map_or_else(Clip::default, Preset::clip))?,
+            shading: shading.filled(preset.map_or_else(Shading::default, Preset::shading))?,
             splatting: tables::splatting(splatting, splatting_of_preset)?,
             fitting,
         };

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use glam::UVec3;
 
-use super::names::{METHODS, name_of};
 use super::{Scene, load};
 use crate::error::setting::SettingError;
+use crate::settings::names::{METHODS, name_of};
 use crate::settings::splatting::{Classification, Interpolation, Method, Splatting};
 use crate::volume::{
     Access, COLOR_BYTES, Grid, ReadOptions, StoreIndex, StreamedLevel, StreamedVolume, Volume, VolumeError,

@@ -1,15 +1,10 @@
 //! Typed access to a scene's TOML tables. Every error names the origin, the full key, what was found and what is allowed.
 
-use std::ops::{Add, Mul};
-
-use glam::UVec3;
 use toml::{Table, Value};
 
-use super::{ImageSettings, SceneError};
+use super::SceneError;
 use crate::error::setting::{Allowed, Found, Interval, SettingError};
-use crate::settings::economies::KEYS;
-use crate::settings::transfer_function::{Ramp, RampError};
-use crate::volume::{SIZES, dims_of};
+use crate::settings::economies::TABLE;
 
 /// The origin of values set on the command line.
 pub(super) const OVERRIDE: &str = "--set";
@@ -35,7 +30,8 @@ impl Origins<'_> {
         allowed: impl Into<Allowed>,
     ) -> SceneError {
         let is_overridden = |key: &str| self.overridden.iter().any(|set| is_within(key, set));
-        let any_overridden = is_overridden(key) || related.iter().any(|key| is_overridden(key));
+        let is_related = |key: &&str| is_overridden(key) || !self.overrides_within(key).is_empty();
+        let any_overridden = is_overridden(key) || related.iter().any(is_related);
         SceneError::Invalid {
             origin: if any_overridden { OVERRIDE } else { self.file }.to_owned(),
             key: key.to_owned(),
@@ -55,10 +51,7 @@ impl Origins<'_> {
         let related: &[&str] = match &key[..] {
             "camera.up" => &["camera.direction"],
             "splatting.compositing" => &["preset", "splatting.method", "splatting.order"],
-            "splatting.classification" => {
-                let [whole_below, beta, resolution] = KEYS.map(|(key, _)| key);
-                &["splatting.method", whole_below, beta, resolution]
-            }
+            "splatting.classification" => &["splatting.method", TABLE],
             "splatting.falloff" => &["splatting.classification"],
             "splatting.interpolation" => &["splatting.classification", "splatting.radius", "splatting.falloff"],
             _ => &[],
@@ -106,36 +99,17 @@ impl<'a> Section<'a> {
 
     /// The table under a key; empty if missing.
     pub(super) fn section(&mut self, name: &'static str) -> Result<Self, SceneError> {
-        let empty = Self { origins: self.origins, name: self.key(name), table: Table::new(), known: Vec::new() };
-        let mut section = empty;
-        self.read(name, &mut section, |entry| entry.section("a table"))?;
-        Ok(section)
-    }
-
-    /// Stores the value of a key in `into`, if the key is present.
-    pub(super) fn read<T>(
-        &mut self,
-        name: &'static str,
-        into: &mut T,
-        read: impl FnOnce(&Entry<'a>) -> Result<T, SceneError>,
-    ) -> Result<(), SceneError> {
-        self.known.push(name);
-        if let Some(value) = self.table.remove(name) {
-            *into = read(&Entry { origins: self.origins, key: self.key(name), value })?;
+        match self.take(name) {
+            Some(entry) => entry.section("a table"),
+            None => Ok(Self { origins: self.origins, name: self.key(name), table: Table::new(), known: Vec::new() }),
         }
-        Ok(())
     }
 
-    /// The value of a required key.
-    pub(super) fn require<T>(
-        &mut self,
-        name: &'static str,
-        allowed: &str,
-        read: impl FnOnce(&Entry<'a>) -> Result<T, SceneError>,
-    ) -> Result<T, SceneError> {
-        let mut value = None;
-        self.read(name, &mut value, |entry| read(entry).map(Some))?;
-        value.ok_or_else(|| self.origins.invalid(&self.key(name), &[], "no such key", allowed))
+    /// Takes out the value of a key, if the key is present.
+    pub(super) fn take(&mut self, name: &'static str) -> Option<Entry<'a>> {
+        self.known.push(name);
+        let value = self.table.remove(name)?;
+        Some(Entry { origins: self.origins, key: self.key(name), value })
     }
 
     /// Whether a key is present.
@@ -168,13 +142,10 @@ impl<'a> Section<'a> {
     }
 }
 
-/// The allowed labels, for errors.
-pub(super) const LABEL: &str = "an integer >= 0, from 2⁶³ on in quotes";
-
 /// A value and its full key.
 pub(super) struct Entry<'a> {
-    origins: &'a Origins<'a>,
-    key: String,
+    pub(super) origins: &'a Origins<'a>,
+    pub(super) key: String,
     pub(super) value: Value,
 }
 
@@ -195,81 +166,10 @@ impl<'a> Entry<'a> {
         Ok(Section { origins: self.origins, name: self.key.clone(), table, known: Vec::new() })
     }
 
-    pub(super) fn boolean(&self) -> Result<bool, SceneError> {
-        self.value.as_bool().ok_or_else(|| self.mistyped("true or false"))
-    }
-
-    pub(super) fn text(&self, allowed: &str) -> Result<String, SceneError> {
-        self.value.as_str().map(str::to_owned).ok_or_else(|| self.mistyped(allowed))
-    }
-
-    /// A choice by its name.
-    pub(super) fn choice<T: Copy>(&self, choices: &[(&str, T)]) -> Result<T, SceneError> {
-        let allowed = || choices.iter().map(|(name, _)| format!("{name:?}")).collect::<Vec<_>>().join(" or ");
-        let text = self.value.as_str().ok_or_else(|| self.mistyped(allowed()))?;
-        let chosen = choices.iter().find(|(name, _)| *name == text);
-        chosen.map(|&(_, choice)| choice).ok_or_else(|| self.refused(allowed()))
-    }
-
-    /// A number of pixels.
-    pub(super) fn pixels(&self) -> Result<u32, SceneError> {
-        let allowed = ImageSettings::PIXELS;
+    /// An integer that a type holds.
+    pub(super) fn integer<T: TryFrom<i64>>(&self, allowed: &str) -> Result<T, SceneError> {
         let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
-        u32::try_from(integer).map_err(|_| self.refused(allowed))
-    }
-
-    /// The number of voxels along x, y and z.
-    pub(super) fn dims(&self) -> Result<UVec3, SceneError> {
-        let sizes = self.array::<3>(SIZES)?.map(|size| size.value.as_integer().ok_or_else(|| size.mistyped(SIZES)));
-        let [x, y, z] = sizes;
-        dims_of([x?, y?, z?]).ok_or_else(|| self.refused(SIZES))
-    }
-
-    /// A number of bytes.
-    pub(super) fn bytes(&self) -> Result<u64, SceneError> {
-        let allowed = "an integer >= 0";
-        let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
-        u64::try_from(integer).map_err(|_| self.refused(allowed))
-    }
-
-    /// The number of a channel or time.
-    pub(super) fn count(&self) -> Result<u32, SceneError> {
-        let allowed = "an integer >= 0";
-        let integer = self.value.as_integer().ok_or_else(|| self.mistyped(allowed))?;
-        u32::try_from(integer).map_err(|_| self.refused(allowed))
-    }
-
-    /// The number of a level; `None` for one that is chosen.
-    pub(super) fn level(&self) -> Result<Option<u32>, SceneError> {
-        let allowed = "an integer >= 0 or \"auto\"";
-        match (self.value.as_integer(), self.value.as_str()) {
-            (Some(integer), _) => u32::try_from(integer).map(Some).map_err(|_| self.refused(allowed)),
-            (_, Some("auto")) => Ok(None),
-            (_, Some(_)) => Err(self.refused(allowed)),
-            _ => Err(self.mistyped(allowed)),
-        }
-    }
-
-    /// A series, by its number or its identity.
-    pub(super) fn series(&self) -> Result<Option<String>, SceneError> {
-        let allowed = "an integer >= 0, or a SeriesInstanceUID in quotes";
-        match (self.value.as_integer(), self.value.as_str()) {
-            (Some(integer), _) => {
-                u32::try_from(integer).map(|number| Some(number.to_string())).map_err(|_| self.refused(allowed))
-            }
-            (_, Some(text)) => Ok(Some(text.to_owned())),
-            _ => Err(self.mistyped(allowed)),
-        }
-    }
-
-    /// A label.
-    pub(super) fn label(&self) -> Result<u64, SceneError> {
-        match (self.value.as_integer(), self.value.as_str()) {
-            (Some(integer), _) => u64::try_from(integer).map_err(|_| self.refused(LABEL)),
-            // TOML's integers end at 2⁶³.
-            (_, Some(text)) => text.parse().map_err(|_| self.refused(LABEL)),
-            _ => Err(self.mistyped(LABEL)),
-        }
+        T::try_from(integer).map_err(|_| self.refused(allowed))
     }
 
     /// A number, written as a float or an integer. The settings' own check tests its range.
@@ -310,33 +210,6 @@ impl<'a> Entry<'a> {
             value: value.clone(),
         };
         Ok(values.iter().enumerate().map(item).collect())
-    }
-
-    /// Control points `[position, value]`; `point` is an example for errors.
-    pub(super) fn ramp<T>(
-        &self,
-        point: &str,
-        read: impl Fn(&Entry) -> Result<T, SceneError>,
-    ) -> Result<Ramp<T>, SceneError>
-    where
-        T: Copy + Add<Output = T> + Mul<f64, Output = T>,
-    {
-        let allowed = format!("an array of one or more {point}");
-        let items = self.items(&allowed)?;
-        let points = items.iter().map(|item| {
-            let [at, value] = item.array(point)?;
-            Ok((at.number(Interval::FINITE)?, read(&value)?))
-        });
-        Ramp::new(points.collect::<Result<_, SceneError>>()?).map_err(|error| match error {
-            RampError::Empty => self.refused(allowed),
-            RampError::NotFinite { index, position } => {
-                let key = format!("{}[{index}][0]", self.key);
-                self.origins.refused(SettingError::new(key, position, Interval::FINITE))
-            }
-            RampError::NotIncreasing { index, .. } => {
-                items[index].refused("points whose first number is above that of the point before")
-            }
-        })
     }
 }
 

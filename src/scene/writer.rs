@@ -6,17 +6,16 @@ use std::path::{Component, Path, PathBuf};
 use glam::DVec3;
 use toml::Value;
 
-use super::names::{
-    BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, LABEL_GRADIENTS, METHODS, ORDERS,
-    PROFILES, RASTERIZERS, name_of,
-};
-use super::{Channel, Fitting, ImageSettings, Scene, SceneError, TransferSettings, VolumeSource};
-use crate::appearance::{Colormap, Preset};
-use crate::settings::camera::{Camera, Projection};
+use super::keys::{LabelTable, Root, VolumeTable};
+use super::{Channel, Fitting, Scene, SceneError, TransferSettings, VolumeSource};
+use crate::appearance::Preset;
+use crate::settings::camera::Camera;
+use crate::settings::camera_table::CameraTable;
 use crate::settings::clip::Clip;
-use crate::settings::economies::Economies;
-use crate::settings::shading::{Gradient, Light, Shading};
-use crate::settings::splatting::{Classification, Splatting};
+use crate::settings::economies::TABLE;
+use crate::settings::key::{Choice, Key, Keyed, Slot};
+use crate::settings::light::Light;
+use crate::settings::shading::Shading;
 use crate::settings::transfer_function::Ramp;
 use crate::volume::{RawLayout, is_address};
 
@@ -40,9 +39,7 @@ impl Scene {
         let Self { channels, camera, image, clip, shading, splatting, fitting } = self;
         let Channel { name, visible, transfer, .. } = channels.first();
         let mut text = Text::default();
-        if let Some(preset) = transfer.preset {
-            text.line("preset", name_of(&Preset::ALL, preset));
-        }
+        text.keys(&Root { preset: transfer.preset }, &[], |_, _| true);
         // One channel without a name has no need of a table.
         let is_one = channels.len() == 1 && name.is_none() && *visible;
         for (number, channel) in channels.iter().enumerate() {
@@ -52,17 +49,28 @@ impl Scene {
         text.channel = None;
         // Without these tables the camera is this one again (SPEC §2).
         if !(is_one && !transfer.states_more() && *camera == Camera::of_object()) {
-            write_camera(&mut text, camera);
+            let camera = CameraTable::from(*camera);
+            text.table("camera");
+            let first = ["projection", "height", "fov_y", "distance", "near"];
+            text.keys(&camera, &first, |name, _| name != "fov_y" || camera.is_perspective);
         }
-        write_image(&mut text, image);
+        text.table("image");
+        text.keys(image, &[], |_, _| true);
         // Settings that the preset that fits is to choose are not written.
         let light_step = fitting.light_step && transfer.preset.is_some();
         let fitting = if self.is_fitting() { *fitting } else { Fitting { light_step, ..Fitting::NONE } };
         let unstated = transfer.preset.map_or_else(Clip::default, Preset::clip).shade_faces;
         let leaves_faces = clip.shade_faces == unstated && fitting.is_open <= fitting.shade_faces;
-        write_clip(&mut text, clip, leaves_faces);
+        // Scenes that do not state it stay as they were, and so do the fingerprints of their parts.
+        if !(clip.is_empty() && leaves_faces) {
+            text.table("clip");
+            text.keys(clip, &[], |name, _| name != "shade_faces" || !leaves_faces);
+        }
         write_shading(&mut text, shading, transfer.preset, fitting);
-        write_splatting(&mut text, splatting, fitting);
+        text.table("splatting");
+        text.keys(splatting, &[], |name, is_default| !(is_default && fitting.leaves(name)));
+        text.table(TABLE);
+        text.keys(&splatting.experimental, &[], |_, _| true);
         Ok(text.text)
     }
 }
@@ -79,51 +87,43 @@ struct Text {
 }
 
 fn write_channel(text: &mut Text, name_of_file: &NameOfFile<'_>, channel: &Channel) -> Result<(), SceneError> {
-    let Channel { name, visible, volume, spacing, labels, label_table, index, time, level, series, transfer } = channel;
     if text.channel.is_some() {
         let _ = writeln!(text.text, "\n[[channel]]");
-        text.given("name", name.as_deref());
-        if !visible {
-            text.line("visible", false);
-        }
+        text.keys(channel, &[], |_, is_default| !is_default);
     }
     let key = |name: &str| match text.channel {
         Some(number) => format!("channel[{number}].volume.{name}"),
         None => format!("volume.{name}"),
     };
-    let (of_path, of_labels, of_table, of_offset) = (key("path"), key("labels"), key("label_table"), key("offset"));
-    // A later channel without a volume is one of the first one's.
-    if *volume != VolumeSource::Memory || text.channel.is_none_or(|number| number == 0) {
-        text.table("volume");
-    }
-    match volume {
-        VolumeSource::File(path) => text.line("path", name_of_file(path, &of_path)?),
+    let within = |name: &str, path: &Path| name_of_file(path, &key(name));
+    let mut table = VolumeTable { channel: channel.clone(), ..VolumeTable::default() };
+    match &channel.volume {
+        VolumeSource::File(path) => table.path = Some(within("path", path)?),
         VolumeSource::Raw(path, layout) => {
             let RawLayout { dims, sample_type, big_endian, offset } = *layout;
-            text.line("path", name_of_file(path, &of_path)?);
-            text.line("dims", dims.to_array().map(i64::from).map(Value::from).to_vec());
-            text.line("type", sample_type.to_string());
-            text.line("endian", if big_endian { "big" } else { "little" });
-            let allowed = format!("at most {}, the largest integer in TOML", i64::MAX);
-            let offset = i64::try_from(offset).map_err(|_| invalid(&of_offset, offset.to_string(), &allowed));
-            text.line("offset", offset?);
+            if i64::try_from(offset).is_err() {
+                let allowed = format!("at most {}, the largest integer in TOML", i64::MAX);
+                return Err(invalid(&key("offset"), offset.to_string(), &allowed));
+            }
+            table.path = Some(within("path", path)?);
+            (table.dims, table.sample_type) = (Some(dims), Some(sample_type));
+            (table.big_endian, table.offset) = (Some(big_endian), Some(offset));
         }
-        VolumeSource::Builtin(name) => text.line("builtin", name.as_str()),
+        VolumeSource::Builtin(name) => table.builtin = Some(name.clone()),
         VolumeSource::Memory => {}
     }
-    text.given("spacing", spacing.map(vector));
-    let labels = labels.as_ref().map(|path| name_of_file(path, &of_labels));
-    text.given("labels", labels.transpose()?);
-    let table = label_table.as_ref().map(|path| match path.to_str() {
+    table.labels = channel.labels.as_ref().map(|path| within("labels", path)).transpose()?;
+    let of_labels = channel.label_table.as_ref().map(|path| match path.to_str() {
         Some(name) if name.starts_with("builtin:") => Ok(name.to_owned()),
-        _ => name_of_file(path, &of_table),
+        _ => within("label_table", path),
     });
-    text.given("label_table", table.transpose()?);
-    text.given("index", index.map(i64::from));
-    text.given("time", time.map(i64::from));
-    text.given("level", level.map(i64::from));
-    text.given("series", series.as_deref());
-    write_transfer(text, transfer);
+    table.label_table = of_labels.transpose()?;
+    // A later channel without a volume is one of the first one's.
+    if channel.volume != VolumeSource::Memory || text.channel.is_none_or(|number| number == 0) {
+        text.table("volume");
+    }
+    text.keys(&table, &["path", "dims", "type", "endian", "offset"], |_, _| true);
+    write_transfer(text, &channel.transfer);
     Ok(())
 }
 
@@ -134,44 +134,67 @@ impl Text {
         let _ = writeln!(self.text, "{gap}[{parent}{name}]");
     }
 
-    fn line(&mut self, key: &str, value: impl Into<Value>) {
-        let _ = writeln!(self.text, "{key} = {}", value.into());
-    }
-
-    fn given(&mut self, key: &str, value: Option<impl Into<Value>>) {
-        if let Some(value) = value {
-            self.line(key, value);
+    /// Writes the keys that have values, some of them first. A key and whether it has its default decide if it is kept.
+    fn keys<T: Keyed>(&mut self, settings: &T, first: &[&str], is_kept: impl Fn(&str, bool) -> bool) {
+        let (mut settings, mut default) = (settings.clone(), T::default());
+        let mut keys: Vec<&Key<T>> = T::KEYS.iter().collect();
+        keys.sort_by_key(|key| first.iter().position(|name| *name == key.name).unwrap_or(first.len()));
+        for Key { name, slot, .. } in keys {
+            let value = value(&slot(&mut settings));
+            let is_default = value == self::value(&slot(&mut default));
+            if let Some(value) = value.filter(|_| is_kept(name, is_default)) {
+                self.line(name, slot(&mut settings).is_ramp(), &value);
+            }
         }
     }
 
-    /// Writes a ramp as `[position, value]` points.
-    fn ramp<T>(&mut self, key: &str, ramp: Option<&Ramp<T>>, value: impl Fn(&T) -> Value)
-    where
-        T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
-    {
-        let Some(ramp) = ramp else { return };
-        let points: Vec<Value> =
-            ramp.points().iter().map(|(at, y)| Value::Array(vec![(*at).into(), value(y)])).collect();
-        if points.len() <= ON_ONE_LINE {
-            return self.line(key, points);
-        }
-        let _ = writeln!(self.text, "{key} = [");
-        for point in points {
-            let _ = writeln!(self.text, "    {point},");
-        }
-        let _ = writeln!(self.text, "]");
+    fn line(&mut self, key: &str, is_ramp: bool, value: &Value) {
+        let _ = match value {
+            Value::Array(points) if is_ramp && points.len() > ON_ONE_LINE => {
+                let points: String = points.iter().map(|point| format!("    {point},\n")).collect();
+                writeln!(self.text, "{key} = [\n{points}]")
+            }
+            _ => writeln!(self.text, "{key} = {value}"),
+        };
     }
+}
 
-    fn ramps(
-        &mut self,
-        color: Option<&Ramp<DVec3>>,
-        opacity: Option<&Ramp<f64>>,
-        gradient_opacity: Option<&Ramp<f64>>,
-    ) {
-        self.ramp("color", color, |&rgb| vector(rgb));
-        self.ramp("opacity", opacity, |&opacity| opacity.into());
-        self.ramp("gradient_opacity", gradient_opacity, |&factor| factor.into());
-    }
+/// A key's value; `None` for one that is not stated, or written by tables of their own.
+pub(super) fn value(slot: &Slot) -> Option<Value> {
+    Some(match slot {
+        Slot::Switch(value) => (**value).into(),
+        Slot::Number(_, value) => (**value).into(),
+        Slot::Given(_, value) => (**value)?.into(),
+        Slot::Choice(Choice { names, chosen, .. }) => names[(*chosen)?].into(),
+        Slot::Direction(value) => vector(**value),
+        Slot::Vector(_, value) => vector((**value)?),
+        Slot::Light(Light::Headlight) => "headlight".into(),
+        Slot::Light(Light::UpperLeft) => "upper-left".into(),
+        Slot::Light(Light::Direction(direction)) => vector(*direction),
+        Slot::Pixels(value) => i64::from(**value).into(),
+        Slot::Background(value) => numbers(**value),
+        Slot::Planes(value) => value.iter().copied().map(numbers).collect::<Vec<_>>().into(),
+        Slot::Crop(value) => (**value)?.map(vector).to_vec().into(),
+        Slot::Colors(value) => ramp(value.as_ref()?, vector),
+        Slot::Shares(_, value) => ramp(value.as_ref()?, Value::from),
+        Slot::Ranges(value) => value.as_ref()?.iter().copied().map(numbers).collect::<Vec<_>>().into(),
+        Slot::Labels(_) => return None,
+        Slot::Label(value) => {
+            (**value).map(|label| i64::try_from(label).map_or(label.to_string().into(), Value::from))?
+        }
+        Slot::Text(_, value) | Slot::Series(value) => value.as_deref()?.into(),
+        Slot::Number32(value) | Slot::Level(value) => i64::from((**value)?).into(),
+        Slot::Dims(value) => (**value)?.to_array().map(i64::from).map(Value::from).to_vec().into(),
+        Slot::Bytes(value) => i64::try_from((**value)?).ok()?.into(),
+    })
+}
+
+/// A ramp as `[position, value]` points.
+fn ramp<T>(ramp: &Ramp<T>, value: impl Fn(T) -> Value) -> Value
+where
+    T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
+{
+    ramp.points().iter().map(|&(at, of)| Value::Array(vec![at.into(), value(of)])).collect::<Vec<_>>().into()
 }
 
 fn vector(vector: DVec3) -> Value {
@@ -179,167 +202,36 @@ fn vector(vector: DVec3) -> Value {
 }
 
 fn numbers(numbers: impl IntoIterator<Item = f64>) -> Value {
-    Value::Array(numbers.into_iter().map(Value::from).collect())
-}
-
-fn write_camera(text: &mut Text, camera: &Camera) {
-    let Camera { projection, direction, up, center, fit, is_eye_open: _ } = camera;
-    text.table("camera");
-    match *projection {
-        Projection::Orthographic { height } => {
-            text.line("projection", "orthographic");
-            text.given("height", height);
-        }
-        Projection::Perspective { fov_y, distance, near } => {
-            text.line("projection", "perspective");
-            text.line("fov_y", fov_y);
-            text.given("distance", distance);
-            text.given("near", near);
-        }
-    }
-    text.line("direction", vector(*direction));
-    text.line("up", vector(*up));
-    text.given("center", center.map(vector));
-    text.line("fit", name_of(FITS, *fit));
-}
-
-fn write_image(text: &mut Text, image: &ImageSettings) {
-    let ImageSettings { width, height, background } = *image;
-    text.table("image");
-    text.line("width", i64::from(width));
-    text.line("height", i64::from(height));
-    text.line("background", numbers(background));
-}
-
-fn write_clip(text: &mut Text, clip: &Clip, leaves_faces: bool) {
-    let Clip { planes, crop, shade_faces } = clip;
-    if clip.is_empty() && leaves_faces {
-        return;
-    }
-    text.table("clip");
-    text.line("planes", planes.iter().map(|&plane| numbers(plane)).collect::<Vec<_>>());
-    text.given("crop", crop.map(|corners| corners.map(vector).to_vec()));
-    // Scenes that do not state it stay as they were, and so do the fingerprints of their parts.
-    if !leaves_faces {
-        text.line("shade_faces", *shade_faces);
-    }
+    numbers.into_iter().collect::<Vec<_>>().into()
 }
 
 fn write_transfer(text: &mut Text, transfer: &TransferSettings) {
-    let TransferSettings { preset: _, colormap, color, opacity, gradient_opacity, iso_ranges, labels } = transfer;
     // An empty table would state that the scene has its own transfer function (SPEC §9).
     if transfer.states_more() {
         text.table("transfer");
     }
-    text.given("colormap", colormap.map(|map| name_of(&Colormap::ALL, map)));
-    text.ramps(color.as_ref(), opacity.as_ref(), gradient_opacity.as_ref());
-    let ranges = iso_ranges.as_ref().map(|ranges| ranges.iter().map(|&range| numbers(range)).collect::<Vec<_>>());
-    text.given("iso_ranges", ranges);
-    for (&label, tables) in labels {
+    text.keys(transfer, &["colormap"], |_, _| true);
+    for (&label, tables) in &transfer.labels {
         let parent = if text.channel.is_some() { "channel." } else { "" };
         let _ = writeln!(text.text, "\n[[{parent}transfer.label]]");
-        match i64::try_from(label) {
-            Ok(label) => text.line("label", label),
-            Err(_) => text.line("label", label.to_string()),
-        }
-        text.line("visible", tables.visible);
-        text.ramps(tables.color.as_ref(), tables.opacity.as_ref(), tables.gradient_opacity.as_ref());
-        if tables.membership {
-            text.line("gradient", name_of(LABEL_GRADIENTS, true));
-        }
+        let table = LabelTable { label: Some(label), tables: tables.clone() };
+        text.keys(&table, &[], |name, is_default| !(name == "gradient" && is_default));
     }
 }
 
 fn write_shading(text: &mut Text, shading: &Shading, preset: Option<Preset>, fitting: Fitting) {
-    let default = Shading::default();
-    let of_preset = preset.map_or(default, Preset::shading);
-    let Shading {
-        enabled,
-        ambient,
-        diffuse,
-        specular,
-        shininess,
-        light,
-        gradient,
-        occlusion,
-        occlusion_spread,
-        shadow,
-        shadow_spread,
-        light_step,
-    } = *shading;
-    text.table("shading");
-    if !(fitting.enabled && enabled == default.enabled) {
-        text.line("enabled", enabled);
-    }
-    if !(fitting.ambient && ambient == default.ambient) {
-        text.line("ambient", ambient);
-    }
-    if !(fitting.diffuse && diffuse == default.diffuse) {
-        text.line("diffuse", diffuse);
-    }
-    if !(fitting.specular && specular == default.specular) {
-        text.line("specular", specular);
-    }
-    if !(fitting.shininess && shininess == default.shininess) {
-        text.line("shininess", shininess);
-    }
-    match light {
-        _ if fitting.light && light == default.light => {}
-        Light::Headlight => text.line("light", "headlight"),
-        Light::UpperLeft => text.line("light", "upper-left"),
-        Light::Direction(direction) => text.line("light", vector(direction)),
-    }
-    // A scene that does not state it leaves it to the volume.
-    if gradient != Gradient::Auto {
-        text.line("gradient", name_of(GRADIENTS, gradient));
-    }
-    // Scenes without light sheets stay as they were, and so do the fingerprints of their parts. Where a preset has or may choose light, its keys are stated.
+    let has_light = preset.map_or_else(Shading::default, Preset::shading).light_key().is_some();
     let is_open = fitting.is_open;
-    let has_light = of_preset.light_key().is_some();
-    let of_light = [
-        ("occlusion", occlusion, default.occlusion, is_open && !fitting.occlusion || has_light),
-        ("occlusion_spread", occlusion_spread, default.occlusion_spread, false),
-        ("shadow", shadow, default.shadow, is_open && !fitting.shadow || has_light),
-        ("shadow_spread", shadow_spread, default.shadow_spread, false),
-        ("light_step", light_step, default.light_step, (is_open || has_light) && !fitting.light_step),
-    ];
-    for (key, stated, _, _) in
-        of_light.into_iter().filter(|(_, stated, default, is_kept)| stated != default || *is_kept)
-    {
-        text.line(key, stated);
-    }
-}
-
-fn write_splatting(text: &mut Text, splatting: &Splatting, fitting: Fitting) {
-    let Splatting { method, radius, falloff, slab_width, footprint, compositing, order, .. } = *splatting;
-    let Splatting { opacity_threshold, culling, tiles, rasterizer, footprint_box, experimental, .. } = *splatting;
-    let Splatting { classification, interpolation, slab_profile, .. } = *splatting;
-    let Economies { whole_below, beta, resolution } = experimental;
-    text.table("splatting");
-    text.line("method", name_of(METHODS, method));
-    text.line("radius", radius);
-    text.line("falloff", falloff);
-    text.line("slab_width", slab_width);
-    text.line("slab_profile", name_of(PROFILES, slab_profile));
-    // A scene that does not state it leaves it to the volume.
-    if classification != Classification::Auto {
-        text.line("classification", name_of(CLASSIFICATIONS, classification));
-    }
-    text.line("interpolation", name_of(INTERPOLATIONS, interpolation));
-    text.line("footprint", name_of(FORMS, footprint));
-    if !(fitting.compositing && compositing == Splatting::default().compositing) {
-        text.line("compositing", name_of(COMPOSITINGS, compositing));
-    }
-    text.line("order", name_of(ORDERS, order));
-    text.line("opacity_threshold", opacity_threshold);
-    text.line("culling", culling);
-    text.line("tiles", tiles);
-    text.line("rasterizer", name_of(RASTERIZERS, rasterizer));
-    text.line("footprint_box", name_of(BOXES, footprint_box));
-    text.table("splatting.experimental");
-    text.line("whole_below", whole_below);
-    text.line("beta", beta);
-    text.line("resolution", resolution);
+    text.table("shading");
+    let first = ["enabled", "ambient", "diffuse", "specular", "shininess"];
+    text.keys(shading, &first, |name, is_default| match name {
+        _ if !is_default => true,
+        // Scenes without light sheets stay as they were, and so do the fingerprints of their parts. Where a preset has or may choose light, its keys are stated.
+        "occlusion" | "shadow" => is_open && !fitting.leaves(name) || has_light,
+        "light_step" => (is_open || has_light) && !fitting.leaves(name),
+        "occlusion_spread" | "shadow_spread" => false,
+        _ => !fitting.leaves(name),
+    });
 }
 
 /// A file's path: unchanged if absolute or an address, or else relative to a folder.

@@ -5,17 +5,14 @@ use std::ops::Bound;
 use glam::{DMat3, DVec3};
 
 use crate::error::RenderError;
-use crate::error::setting::{Interval, SettingError, check_direction, scaled};
+use crate::error::setting::{Interval, SettingError, scaled};
 use crate::volume::Grid;
 
 /// The range of pixel sizes, in the volume's smallest spacings.
 const PIXELS: std::ops::RangeInclusive<f64> = 1e-25..=1e25;
 
-/// The range of opening angles.
-pub(crate) const FOV_Y: Interval = Interval::new(Bound::Excluded(0.0), Bound::Excluded(180.0)).of("degrees");
-
 /// Up and direction count as parallel if the sine of their angle is below this.
-const PARALLEL: f64 = 1e-9;
+pub(super) const PARALLEL: f64 = 1e-9;
 
 /// How the volume is projected.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,32 +89,6 @@ impl Camera {
     /// The camera with a stated `direction` and `up`.
     pub fn looking(self, [direction, up]: [DVec3; 2]) -> Self {
         Self { direction, up, is_eye_open: false, ..self }
-    }
-
-    /// Checks that the values are in range.
-    ///
-    /// # Errors
-    /// If a number is not finite or out of its range, a vector is 0, or `up` is parallel to `direction`.
-    pub fn check(&self) -> Result<(), SettingError> {
-        match self.projection {
-            Projection::Orthographic { height } => Interval::POSITIVE.check_given("camera.height", height)?,
-            Projection::Perspective { fov_y, distance, near } => {
-                FOV_Y.check("camera.fov_y", fov_y)?;
-                Interval::POSITIVE.check_given("camera.distance", distance)?;
-                Interval::POSITIVE.check_given("camera.near", near)?;
-            }
-        }
-        let Self { direction, up, center, .. } = *self;
-        check_direction("camera.direction", direction)?;
-        check_direction("camera.up", up)?;
-        if let Some(center) = center {
-            Interval::FINITE.check_each("camera.center", &center.to_array())?;
-        }
-        if scaled(direction).normalize().cross(scaled(up).normalize()).length() < PARALLEL {
-            let found = format!("{up} with direction {direction}");
-            return Err(SettingError::new("camera.up", found, "a vector not parallel to camera.direction"));
-        }
-        Ok(())
     }
 
     /// The viewing coordinate system u (screen right), v (screen up), w (into the scene), orthonormal (§4.2).

@@ -2,14 +2,10 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use crate::error::setting::{Interval, SettingError};
+use super::key::{Keyed, Slot};
 
-/// The keys, each with its former name in `[splatting]`.
-pub(crate) const KEYS: [(&str, &str); 3] = [
-    ("splatting.experimental.whole_below", "whole_below"),
-    ("splatting.experimental.beta", "beta"),
-    ("splatting.experimental.resolution", "resolution"),
-];
+/// The table's full key.
+pub(crate) const TABLE: &str = "splatting.experimental";
 
 /// Ways to draw less where it is hardly visible (§8, the paper's future work). Only the tile rasterizer has them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,32 +29,22 @@ impl Default for Economies {
 }
 
 impl Economies {
-    pub(super) fn check(&self) -> Result<(), SettingError> {
-        for ((key, found), allowed) in
-            self.values().into_iter().zip([Interval::SHARE, Interval::THRESHOLD, Interval::SHARE])
-        {
-            allowed.check(key, found)?;
-        }
-        Ok(())
-    }
-
     /// The first of them that is on; `None` if all are off.
-    pub(crate) fn in_use(&self) -> Option<EconomyInUse> {
-        let off = Self::default().values();
-        let used = self.values().into_iter().zip(off).find(|(value, off)| value != off);
-        used.map(|((key, value), (_, off))| EconomyInUse { key, value, off })
-    }
-
-    fn values(&self) -> [(&'static str, f64); 3] {
-        let [whole_below, beta, resolution] = KEYS.map(|(key, _)| key);
-        [(whole_below, self.whole_below), (beta, self.beta), (resolution, self.resolution)]
+    pub(crate) fn in_use(mut self) -> Option<EconomyInUse> {
+        let mut default = Self::default();
+        Self::KEYS.iter().find_map(|key| match [(key.slot)(&mut self), (key.slot)(&mut default)] {
+            [Slot::Number(_, value), Slot::Number(_, off)] if value != off => {
+                Some(EconomyInUse { key: format!("{TABLE}.{}", key.name), value: *value, off: *off })
+            }
+            _ => None,
+        })
     }
 }
 
 /// An economy that is on; displayed as a scene file states it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct EconomyInUse {
-    pub(crate) key: &'static str,
+    pub(crate) key: String,
     pub(crate) value: f64,
     /// The value that turns it off.
     pub(crate) off: f64,

@@ -6,11 +6,16 @@
 //! too. Enums that are likely to grow are `non_exhaustive`; those with two complementary variants, such as [`Order`], are not.
 
 pub(crate) mod camera;
+pub(crate) mod camera_table;
 pub(crate) mod clip;
 mod clip_from_world;
 pub(crate) mod closing;
 pub(crate) mod economies;
 pub(crate) mod framing;
+pub(crate) mod key;
+mod keys;
+pub(crate) mod light;
+pub(crate) mod names;
 pub mod navigation;
 pub(crate) mod shading;
 pub(crate) mod splatting;
@@ -22,7 +27,8 @@ pub use camera::{Camera, Fit, Projection};
 pub use clip::{Clip, HalfSpace, MAX_PLANES};
 pub use economies::Economies;
 pub use framing::{Extent, Sphere};
-pub use shading::{Gradient, Light, Shading};
+pub use light::Light;
+pub use shading::{Gradient, Shading};
 pub use splatting::{
     Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, SlabProfile,
     Splatting,

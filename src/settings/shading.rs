@@ -1,43 +1,11 @@
 //! Shading settings (SPEC §3). `shaders/shade.wgsl` computes the shading, `reference::shading` in f64.
 
-use std::ops::Bound;
-
-use glam::DVec3;
-
-use super::camera::ViewBasis;
-use crate::error::setting::{Interval, SettingError, check_direction, scaled};
+use super::key::Keyed;
+use super::light::Light;
+use crate::error::setting::SettingError;
 
 /// Gradients shorter than this (value per world unit) have no direction (SPEC §3).
 pub const MIN_GRADIENT: f64 = 1e-12;
-
-/// The spreads of light, in `unit`s² per `unit`.
-pub(crate) const LIGHT_SPREAD: Interval = Interval::new(Bound::Included(0.0), Bound::Included(64.0));
-
-/// The steps of light sheets, in `unit`s.
-pub(crate) const LIGHT_STEP: Interval = Interval::new(Bound::Included(0.5), Bound::Included(16.0));
-
-/// The direction of the light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Light {
-    /// From the eye.
-    Headlight,
-    /// From the viewer's upper left: `normalize(-w - u/2 + v/2)` of the camera's axes.
-    UpperLeft,
-    /// From a fixed world direction that points to the light, of any length except 0.
-    Direction(DVec3),
-}
-
-impl Light {
-    /// The unit vector to the light, for a camera's axes; `None` for a headlight, which in perspective is another for every point.
-    pub(crate) fn direction(&self, basis: &ViewBasis) -> Option<DVec3> {
-        match *self {
-            Self::Headlight => None,
-            Self::UpperLeft => Some((-basis.w - basis.u / 2.0 + basis.v / 2.0).normalize()),
-            Self::Direction(direction) => Some(scaled(direction).normalize()),
-        }
-    }
-}
 
 /// The gradient from which normals are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -113,33 +81,7 @@ impl Shading {
     /// # Errors
     /// If a number is not finite or out of its range, or the light's direction is 0.
     pub fn check(&self) -> Result<(), SettingError> {
-        let Self {
-            enabled: _,
-            ambient,
-            diffuse,
-            specular,
-            shininess,
-            light,
-            gradient: _,
-            occlusion,
-            occlusion_spread,
-            shadow,
-            shadow_spread,
-            light_step,
-        } = *self;
-        Interval::NOT_NEGATIVE.check("shading.ambient", ambient)?;
-        Interval::NOT_NEGATIVE.check("shading.diffuse", diffuse)?;
-        Interval::NOT_NEGATIVE.check("shading.specular", specular)?;
-        Interval::POSITIVE.check("shading.shininess", shininess)?;
-        Interval::SHARE.check("shading.occlusion", occlusion)?;
-        LIGHT_SPREAD.check("shading.occlusion_spread", occlusion_spread)?;
-        Interval::SHARE.check("shading.shadow", shadow)?;
-        LIGHT_SPREAD.check("shading.shadow_spread", shadow_spread)?;
-        LIGHT_STEP.check("shading.light_step", light_step)?;
-        match light {
-            Light::Headlight | Light::UpperLeft => Ok(()),
-            Light::Direction(direction) => check_direction("shading.light", direction),
-        }
+        self.check_keys("shading")
     }
 
     /// The key that asks for light sheets (SPEC §14), if one does and voxels are shaded.

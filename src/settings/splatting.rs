@@ -1,17 +1,9 @@
 //! Splatting settings (SPEC §§4–6): kernel, slabs, compositing, early splat elimination.
 
-use std::ops::Bound::{Excluded, Included};
-
 use super::economies::Economies;
+use super::key::Keyed;
 use crate::error::setting::{Interval, SettingError};
 use crate::kernel::Kernel;
-
-/// The range of kernel radii in grid units.
-pub(crate) const RADIUS: Interval = Interval::new(Included(1.0), Included(4.0));
-/// The range of the kernel's Gaussian exponent.
-pub(crate) const FALLOFF: Interval = Interval::new(Excluded(0.0), Included(16.0));
-/// The range of slab widths in `unit`s.
-pub(crate) const SLAB_WIDTH: Interval = Interval::new(Included(0.05), Included(8.0));
 
 /// Checks the opacity of a first hit, which a ray must be able to reach.
 pub(crate) fn check_first_hit(opacity: f64) -> Result<(), SettingError> {
@@ -295,11 +287,8 @@ impl Splatting {
     /// If a number is not finite or out of its range, means are combined with a method without sheets, surfaces with back to front, or
     /// classification after splatting with a setting that excludes it (SPEC §9).
     pub fn check(&self) -> Result<(), SettingError> {
-        RADIUS.check("splatting.radius", self.radius)?;
-        FALLOFF.check("splatting.falloff", self.falloff)?;
-        SLAB_WIDTH.check("splatting.slab_width", self.slab_width)?;
-        Interval::THRESHOLD.check("splatting.opacity_threshold", self.opacity_threshold)?;
-        self.experimental.check()?;
+        self.check_keys("splatting")?;
+        self.experimental.check_keys(super::economies::TABLE)?;
         let refused = |found: String, allowed: &str| Err(SettingError::new("splatting.compositing", found, allowed));
         let name = format!("{:?}", self.compositing).to_lowercase();
         if self.compositing.is_by_means() && self.method == Method::CompositeEverySample {

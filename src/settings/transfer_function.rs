@@ -201,10 +201,10 @@ impl Tables<'_> {
 }
 
 /// The most control points of a ramp of opacities or factors, and the most iso-ranges: pixels of surfaces look at all of them.
-const MAX_POINTS: usize = 1 << 12;
+pub(crate) const MAX_POINTS: usize = 1 << 12;
 
 /// The most control points of a ramp of colours: those of a palette of 16 bits.
-const MAX_COLORS: usize = 1 << 16;
+pub(crate) const MAX_COLORS: usize = 1 << 16;
 
 /// The most pieces of all tables, those of labels included, over which opacities and colours are linear: of each piece backends keep up to 700 bytes.
 const MAX_PIECES: usize = 1 << 19;

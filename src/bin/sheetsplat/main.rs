@@ -90,6 +90,9 @@ enum Command {
     Info(info::Arguments),
     /// List the adapters, whether each is usable, and if not, which limits it lacks.
     Adapters(adapters::Arguments),
+    /// Print the JSON Schema of scene files, by which editors complete them.
+    #[command(after_help = "Example:\n  sheetsplat schema > scene.schema.json")]
+    Schema,
     /// Print completions for a shell.
     Completions(documents::Completions),
     /// Print a man page.
@@ -132,6 +135,7 @@ fn main() -> ExitCode {
         Command::Verify(arguments) => verify::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Adapters(arguments) => adapters::run(&arguments),
+        Command::Schema => stdout::stdout(sheetsplat::scene::schema().as_bytes()),
         Command::Completions(arguments) => documents::completions(&arguments, Arguments::command()),
         Command::Man(arguments) => documents::man(&arguments, Arguments::command()),
         #[cfg(feature = "viewer")]

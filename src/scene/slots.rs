@@ -1,0 +1,167 @@
+//! Reads the keys that are declared ([`Keyed`]) into settings. Their own checks test ranges.
+
+use std::collections::BTreeMap;
+use std::ops::{Add, Mul};
+
+use glam::DVec3;
+
+use super::SceneError;
+use super::color::{rgb, rgba};
+use super::keys::LabelTable;
+use super::reader::{Entry, Section};
+use crate::error::setting::{Interval, SettingError};
+use crate::settings::clip::MAX_PLANES;
+use crate::settings::key::{Choice, Keyed, PIXELS, Slot};
+use crate::settings::light::Light;
+use crate::settings::transfer_function::{LabelTables, Ramp, RampError};
+use crate::volume::{SIZES, dims_of};
+
+/// The allowed labels, for errors.
+const LABEL: &str = "an integer >= 0, from 2⁶³ on in quotes";
+
+/// The allowed integers that count something, for errors.
+const COUNT: &str = "an integer >= 0";
+
+impl Section<'_> {
+    /// Reads keys over what settings have.
+    pub(super) fn fill<T: Keyed>(&mut self, settings: &mut T) -> Result<(), SceneError> {
+        for key in T::KEYS {
+            if let Some(entry) = self.take(key.name) {
+                read(&entry, (key.slot)(settings))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The settings of a table that has only their keys, over what they have.
+    pub(super) fn filled<T: Keyed>(mut self, mut settings: T) -> Result<T, SceneError> {
+        self.fill(&mut settings)?;
+        self.finish()?;
+        Ok(settings)
+    }
+}
+
+/// Stores an entry's value.
+fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
+    match slot {
+        Slot::Switch(into) => *into = entry.value.as_bool().ok_or_else(|| entry.mistyped("true or false"))?,
+        Slot::Number(range, into) => *into = entry.number(range)?,
+        Slot::Given(range, into) => *into = Some(entry.number(range)?),
+        Slot::Choice(Choice { names, mut choose, .. }) => {
+            let allowed = || names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(" or ");
+            let text = entry.value.as_str().ok_or_else(|| entry.mistyped(allowed()))?;
+            choose(names.iter().position(|name| *name == text).ok_or_else(|| entry.refused(allowed()))?);
+        }
+        Slot::Direction(into) => *into = vector(entry)?,
+        Slot::Vector(range, into) => *into = Some(entry.numbers(range)?.into()),
+        Slot::Light(into) => *into = light(entry)?,
+        Slot::Pixels(into) => *into = entry.integer(PIXELS)?,
+        Slot::Background(into) => *into = rgba(entry)?,
+        Slot::Planes(into) => {
+            let items = entry.items(&format!("an array of at most {MAX_PLANES} [nx, ny, nz, d]"))?;
+            *into = items.iter().map(|item| item.numbers(Interval::FINITE)).collect::<Result<_, _>>()?;
+        }
+        Slot::Crop(into) => {
+            let allowed = "[[x, y, z], [x, y, z]], each number of the first below that of the second";
+            let [low, high] = entry.array(allowed)?;
+            *into = Some([vector(&low)?, vector(&high)?]);
+        }
+        Slot::Colors(into) => *into = Some(ramp(entry, "[value, [r, g, b]]", rgb)?),
+        Slot::Shares(point, into) => *into = Some(ramp(entry, point, |share| share.number(Interval::SHARE))?),
+        Slot::Ranges(into) => {
+            let items = entry.items("an array of one or more [lo, hi]")?;
+            let ranges = items.iter().map(|item| item.numbers(Interval::FINITE));
+            *into = Some(ranges.collect::<Result<_, _>>()?);
+        }
+        Slot::Labels(into) => *into = labels(entry)?,
+        Slot::Label(into) => {
+            // TOML's integers end at 2⁶³.
+            let quoted = entry.value.as_str().map(|text| text.parse().map_err(|_| entry.refused(LABEL)));
+            *into = Some(quoted.unwrap_or_else(|| entry.integer(LABEL))?);
+        }
+        Slot::Text(allowed, into) => {
+            let text = entry.value.as_str().ok_or_else(|| entry.mistyped(allowed))?;
+            *into = Some(text.to_owned());
+        }
+        Slot::Number32(into) => *into = Some(entry.integer(COUNT)?),
+        Slot::Level(into) => {
+            let allowed = "an integer >= 0 or \"auto\"";
+            *into = match entry.value.as_str() {
+                Some("auto") => None,
+                Some(_) => return Err(entry.refused(allowed)),
+                None => Some(entry.integer(allowed)?),
+            };
+        }
+        Slot::Series(into) => {
+            let number = || entry.integer::<u32>("an integer >= 0, or a SeriesInstanceUID in quotes");
+            let text = entry.value.as_str().map(str::to_owned);
+            *into = Some(text.map_or_else(|| number().map(|number| number.to_string()), Ok)?);
+        }
+        Slot::Dims(into) => {
+            let [x, y, z] = entry.array::<3>(SIZES)?.map(|size| {
+                // Sizes that are too large are told by all three.
+                size.value.as_integer().ok_or_else(|| size.mistyped(SIZES))
+            });
+            *into = Some(dims_of([x?, y?, z?]).ok_or_else(|| entry.refused(SIZES))?);
+        }
+        Slot::Bytes(into) => *into = Some(entry.integer(COUNT)?),
+    }
+    Ok(())
+}
+
+/// A vector of three numbers.
+fn vector(entry: &Entry) -> Result<DVec3, SceneError> {
+    entry.numbers(Interval::FINITE).map(DVec3::from_array)
+}
+
+/// A light's name or a direction.
+fn light(entry: &Entry) -> Result<Light, SceneError> {
+    let allowed = "\"headlight\", \"upper-left\" or [x, y, z]";
+    match entry.value.as_str() {
+        Some("headlight") => Ok(Light::Headlight),
+        Some("upper-left") => Ok(Light::UpperLeft),
+        Some(_) => Err(entry.refused(allowed)),
+        None if entry.value.is_array() => vector(entry).map(Light::Direction),
+        None => Err(entry.mistyped(allowed)),
+    }
+}
+
+/// Control points `[position, value]`; `point` is their form, for errors.
+fn ramp<T>(entry: &Entry, point: &str, value: impl Fn(&Entry) -> Result<T, SceneError>) -> Result<Ramp<T>, SceneError>
+where
+    T: Copy + Add<Output = T> + Mul<f64, Output = T>,
+{
+    let allowed = format!("an array of one or more {point}");
+    let items = entry.items(&allowed)?;
+    let points = items.iter().map(|item| {
+        let [at, of_point] = item.array(point)?;
+        Ok((at.number(Interval::FINITE)?, value(&of_point)?))
+    });
+    Ramp::new(points.collect::<Result<_, SceneError>>()?).map_err(|error| match error {
+        RampError::Empty => entry.refused(allowed),
+        RampError::NotFinite { index, position } => {
+            let key = format!("{}[{index}][0]", entry.key);
+            entry.origins.refused(SettingError::new(key, position, Interval::FINITE))
+        }
+        RampError::NotIncreasing { index, .. } => {
+            items[index].refused("points whose first number is above that of the point before")
+        }
+    })
+}
+
+/// `[[transfer.label]]`.
+fn labels(entry: &Entry) -> Result<BTreeMap<u64, LabelTables>, SceneError> {
+    let mut labels = BTreeMap::new();
+    for item in entry.items("tables [[transfer.label]]")? {
+        let section = item.section("a table [[transfer.label]]")?;
+        let LabelTable { label, tables } = section.filled(LabelTable::default())?;
+        let key = format!("{}.label", item.key);
+        let label = label.ok_or_else(|| entry.origins.invalid(&key, &[], "no such key", LABEL))?;
+        tables.check(&item.key).map_err(|error| entry.origins.refused(error))?;
+        if labels.insert(label, tables).is_some() {
+            let allowed = "a label that no earlier table has";
+            return Err(entry.origins.refused(SettingError::new(key, label.to_string(), allowed)));
+        }
+    }
+    Ok(labels)
+}
