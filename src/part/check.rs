@@ -28,8 +28,7 @@ pub(crate) fn check_sheets(volume: &Volume, scene: &Scene) -> Result<(), Setting
     if !adds_up(volume, scene) {
         return Ok(());
     }
-    let compositing =
-        crate::settings::names::name_of(crate::settings::names::COMPOSITINGS, scene.splatting.compositing);
+    let compositing = crate::settings::keys::name_of(crate::settings::keys::COMPOSITINGS, scene.splatting.compositing);
     let found = format!("\"{compositing}\" of several channels for a part of an image");
     Err(SettingError::new(
         "splatting.compositing",
@@ -50,7 +49,7 @@ pub(crate) fn check(volume: &Volume, scene: &Scene, window: &Window) -> Result<(
         return Err(SettingError::new("volume", found, format!("at most {MAX_IMAGES}")));
     }
     if splatting.method != Method::ImageAligned {
-        let method = crate::settings::names::name_of(crate::settings::names::METHODS, splatting.method);
+        let method = crate::settings::keys::name_of(crate::settings::keys::METHODS, splatting.method);
         let found = format!("\"{method}\" for a part of an image");
         return Err(SettingError::new("splatting.method", found, "\"image-aligned\""));
     }

@@ -13,7 +13,7 @@ use super::{Identity, Part};
 use crate::image::ImageError;
 use crate::image::channels::Joining;
 use crate::image::open::content;
-use crate::settings::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
+use crate::settings::keys::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
 use crate::settings::transfer_function::{LabelTables, Ramp, TransferFunction};
 use crate::settings::window::{Region, Window};
 
@@ -133,7 +133,7 @@ impl Mean {
         let of_label = |(label, tables): (u16, OfLabel)| Ok::<_, String>((label, tables.tables()?));
         transfer.labels = labels.into_iter().map(of_label).collect::<Result<_, _>>()?;
         transfer.iso_ranges = iso_ranges;
-        transfer.check_as("mean").map_err(|error| error.to_string())?;
+        transfer.parts().check("mean").map_err(|error| error.to_string())?;
         Ok(MeanTables { transfer, has_colors })
     }
 }

@@ -8,7 +8,7 @@ use super::resolve::Resolver;
 use super::{Identity, Part};
 use crate::image::Image;
 use crate::image::channels::Joining;
-use crate::settings::names::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
+use crate::settings::keys::{CLASSIFICATIONS, COMPOSITINGS, ORDERS, name_of};
 use crate::settings::window::{Region, Window};
 use crate::volume::Channels;
 

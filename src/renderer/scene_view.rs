@@ -25,7 +25,7 @@ use crate::settings::framing::Extent;
 use crate::settings::light::Light;
 use crate::settings::shading::Shading;
 use crate::settings::splatting::{Splatting, check_first_hit};
-use crate::settings::transfer_function::{TransferFunction, check_iso_ranges};
+use crate::settings::transfer_function::{Parts, TransferFunction};
 use crate::settings::window::Window;
 use crate::volume::Channels;
 
@@ -122,7 +122,7 @@ impl SceneView {
     /// # Errors
     /// If the list of iso-ranges is empty, or one is not finite or reversed; then nothing changes.
     pub fn set_iso_ranges(&mut self, iso_ranges: Option<Vec<[f64; 2]>>) -> Result<Touched, SettingError> {
-        check_iso_ranges("transfer", iso_ranges.as_deref())?;
+        Parts { iso_ranges: iso_ranges.as_deref(), ..Parts::default() }.check("transfer")?;
         Ok(self.volume.set_iso_ranges(iso_ranges))
     }
 

@@ -4,7 +4,7 @@ use super::{Channel, ImageSettings, Scene, TransferSettings};
 use crate::appearance::Colormap;
 use crate::error::setting::SettingError;
 use crate::settings::key::Keyed;
-use crate::settings::transfer_function::{Parts, check_iso_ranges, check_labels, check_pieces, check_ramps};
+use crate::settings::transfer_function::{Parts, check_pieces};
 use crate::settings::{Classification, Gradient};
 use crate::volume::{Volume, check_spacing};
 
@@ -24,20 +24,17 @@ impl TransferSettings {
     /// # Errors
     /// As for [`TransferFunction::check`](crate::settings::TransferFunction::check).
     pub fn check(&self) -> Result<(), SettingError> {
-        self.check_as("transfer")
+        self.parts().check("transfer")
     }
 
-    /// [`Self::check`] for the table of a channel.
-    pub(super) fn check_as(&self, table: &str) -> Result<(), SettingError> {
-        check_ramps(table, self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())?;
-        check_iso_ranges(table, self.iso_ranges.as_deref())?;
-        check_labels(table, &mut self.labels.iter().map(|(&label, tables)| (label, tables)))
-    }
-
-    fn parts(&self) -> Parts<'_> {
-        let (color, opacity) = (self.color.as_ref(), self.opacity.as_ref());
-        let labels = self.labels.values().collect();
-        Parts { color, opacity, iso_ranges: self.iso_ranges.as_deref(), labels }
+    pub(super) fn parts(&self) -> Parts<'_> {
+        Parts {
+            color: self.color.as_ref(),
+            opacity: self.opacity.as_ref(),
+            gradient_opacity: self.gradient_opacity.as_ref(),
+            iso_ranges: self.iso_ranges.as_deref(),
+            labels: self.labels.iter().map(|(&label, tables)| (label, tables)).collect(),
+        }
     }
 
     /// Checks that the volume has the labels or palette that the settings need.
@@ -81,7 +78,7 @@ impl Scene {
         }
         self.check_tables()?;
         for (number, channel) in self.channels.iter().enumerate() {
-            channel.transfer.check_as(&self.transfer_table(number))?;
+            channel.transfer.parts().check(&self.transfer_table(number))?;
         }
         self.check_pieces()?;
         self.check_membership()

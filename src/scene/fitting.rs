@@ -1,9 +1,9 @@
 //! The preset that fits a volume, where a scene states nothing about its appearance.
 
+use super::slots::value;
 use crate::appearance::Preset;
-use crate::settings::clip::Clip;
+use crate::settings::key::{Key, Keyed};
 use crate::settings::shading::Shading;
-use crate::settings::splatting::Splatting;
 use crate::volume::{Grid, Volume, builtin};
 
 /// The pixels along a side of light sheets that a preset takes at most, unless the volume has more at the greatest step.
@@ -85,23 +85,15 @@ impl Fitting {
         self.keys().iter().any(|(name, is_open)| *name == key && **is_open)
     }
 
-    /// The shading, with a preset's where it is open.
-    pub(super) fn shading(self, stated: Shading, preset: Preset) -> Shading {
-        let (of_preset, default) = (preset.shading(), Shading::default());
-        let number = |is_open: bool, of: fn(&Shading) -> f64| {
-            of(if is_open && of(&stated) == of(&default) { &of_preset } else { &stated })
-        };
-        Shading {
-            enabled: if self.enabled && stated.enabled { of_preset.enabled } else { stated.enabled },
-            ambient: number(self.ambient, |shading| shading.ambient),
-            diffuse: number(self.diffuse, |shading| shading.diffuse),
-            specular: number(self.specular, |shading| shading.specular),
-            shininess: number(self.shininess, |shading| shading.shininess),
-            light: if self.light && stated.light == default.light { of_preset.light } else { stated.light },
-            occlusion: number(self.occlusion, |shading| shading.occlusion),
-            shadow: number(self.shadow, |shading| shading.shadow),
-            ..stated
+    /// Settings, with a preset's where they are left to it.
+    pub(super) fn fitted<T: Keyed>(self, mut stated: T, mut of_preset: T) -> T {
+        let mut default = T::default();
+        for Key { slot, .. } in T::KEYS.iter().filter(|key| self.leaves(key.name)) {
+            if value(&slot(&mut stated)) == value(&slot(&mut default)) {
+                slot(&mut stated).take_over(slot(&mut of_preset));
+            }
         }
+        stated
     }
 
     /// The step of light sheets on a grid, where it is open and a preset lights the volume: the stated one, doubled until sheets have at most
@@ -114,18 +106,6 @@ impl Fitting {
         }
         let is_small = |step: &f64| 2.0 * (grid.bounding_radius(radius) / grid.unit() / step).ceil() < MOST_PIXELS;
         [1.0, 2.0, 4.0].map(|factor| factor * step).into_iter().find(is_small).unwrap_or(8.0 * step)
-    }
-
-    /// The cuts, with a preset's shading of their faces where it is open.
-    pub(super) fn clip(self, stated: Clip, preset: Preset) -> Clip {
-        let shade_faces = stated.shade_faces && (!self.shade_faces || preset.clip().shade_faces);
-        Clip { shade_faces, ..stated }
-    }
-
-    /// The splatting settings, with a preset's compositing where it is open.
-    pub(super) fn splatting(self, stated: Splatting, preset: Preset) -> Splatting {
-        let is_open = self.compositing && stated.compositing == Splatting::default().compositing;
-        Splatting { compositing: if is_open { preset.compositing() } else { stated.compositing }, ..stated }
     }
 }
 

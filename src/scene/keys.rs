@@ -9,7 +9,7 @@ use crate::settings::key::Slot::{
     Vector,
 };
 use crate::settings::key::{Key, Keyed, choice, chosen, key};
-use crate::settings::names::{ENDIANS, LABEL_GRADIENTS};
+use crate::settings::keys::{ENDIANS, LABEL_GRADIENTS};
 use crate::settings::transfer_function::LabelTables;
 use crate::volume::{SPACING, SampleType};
 

@@ -261,9 +261,10 @@ impl Scene {
             self.clone().with_transfer(TransferSettings { preset: Some(preset), ..TransferSettings::default() });
         // The surface that stands out of the builtin head is its skin.
         let lit_by = if preset == Preset::None && is_builtin_head(volume) { Preset::CtSkin } else { preset };
-        let shading = step(self.fitting.shading(self.shading, lit_by), lit_by);
-        let mut splatting = self.fitting.splatting(self.splatting, preset);
-        let clip = self.fitting.clip(self.clip.clone(), preset);
+        let shading = step(self.fitting.fitted(self.shading, lit_by.shading()), lit_by);
+        let of_preset = Splatting { compositing: preset.compositing(), ..Splatting::default() };
+        let mut splatting = self.fitting.fitted(self.splatting, of_preset);
+        let clip = self.fitting.fitted(self.clip.clone(), preset.clip());
         if splatting.classification == Classification::Auto && exceeds_digits(volume) {
             splatting.classification = Classification::Before;
         }

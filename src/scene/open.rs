@@ -6,7 +6,7 @@ use glam::UVec3;
 
 use super::{Scene, load};
 use crate::error::setting::SettingError;
-use crate::settings::names::{METHODS, name_of};
+use crate::settings::keys::{METHODS, name_of};
 use crate::settings::splatting::{Classification, Interpolation, Method, Splatting};
 use crate::volume::{
     Access, COLOR_BYTES, Grid, ReadOptions, StoreIndex, StreamedLevel, StreamedVolume, Volume, VolumeError,

@@ -1,9 +1,10 @@
-//! Reads the keys that are declared ([`Keyed`]) into settings. Their own checks test ranges.
+//! The values of keys in scene files: read into settings, whose own checks test ranges, and as they are written.
 
 use std::collections::BTreeMap;
 use std::ops::{Add, Mul};
 
 use glam::DVec3;
+use toml::Value;
 
 use super::SceneError;
 use super::color::{rgb, rgba};
@@ -52,7 +53,7 @@ fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
             let text = entry.value.as_str().ok_or_else(|| entry.mistyped(allowed()))?;
             choose(names.iter().position(|name| *name == text).ok_or_else(|| entry.refused(allowed()))?);
         }
-        Slot::Direction(into) => *into = vector(entry)?,
+        Slot::Direction(into) => *into = direction(entry)?,
         Slot::Vector(range, into) => *into = Some(entry.numbers(range)?.into()),
         Slot::Light(into) => *into = light(entry)?,
         Slot::Pixels(into) => *into = entry.integer(PIXELS)?,
@@ -64,10 +65,10 @@ fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
         Slot::Crop(into) => {
             let allowed = "[[x, y, z], [x, y, z]], each number of the first below that of the second";
             let [low, high] = entry.array(allowed)?;
-            *into = Some([vector(&low)?, vector(&high)?]);
+            *into = Some([direction(&low)?, direction(&high)?]);
         }
-        Slot::Colors(into) => *into = Some(ramp(entry, "[value, [r, g, b]]", rgb)?),
-        Slot::Shares(point, into) => *into = Some(ramp(entry, point, |share| share.number(Interval::SHARE))?),
+        Slot::Colors(into) => *into = Some(points(entry, "[value, [r, g, b]]", rgb)?),
+        Slot::Shares(point, into) => *into = Some(points(entry, point, |share| share.number(Interval::SHARE))?),
         Slot::Ranges(into) => {
             let items = entry.items("an array of one or more [lo, hi]")?;
             let ranges = items.iter().map(|item| item.numbers(Interval::FINITE));
@@ -110,7 +111,7 @@ fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
 }
 
 /// A vector of three numbers.
-fn vector(entry: &Entry) -> Result<DVec3, SceneError> {
+fn direction(entry: &Entry) -> Result<DVec3, SceneError> {
     entry.numbers(Interval::FINITE).map(DVec3::from_array)
 }
 
@@ -121,13 +122,13 @@ fn light(entry: &Entry) -> Result<Light, SceneError> {
         Some("headlight") => Ok(Light::Headlight),
         Some("upper-left") => Ok(Light::UpperLeft),
         Some(_) => Err(entry.refused(allowed)),
-        None if entry.value.is_array() => vector(entry).map(Light::Direction),
+        None if entry.value.is_array() => direction(entry).map(Light::Direction),
         None => Err(entry.mistyped(allowed)),
     }
 }
 
 /// Control points `[position, value]`; `point` is their form, for errors.
-fn ramp<T>(entry: &Entry, point: &str, value: impl Fn(&Entry) -> Result<T, SceneError>) -> Result<Ramp<T>, SceneError>
+fn points<T>(entry: &Entry, point: &str, value: impl Fn(&Entry) -> Result<T, SceneError>) -> Result<Ramp<T>, SceneError>
 where
     T: Copy + Add<Output = T> + Mul<f64, Output = T>,
 {
@@ -164,4 +165,50 @@ fn labels(entry: &Entry) -> Result<BTreeMap<u64, LabelTables>, SceneError> {
         }
     }
     Ok(labels)
+}
+
+/// A key's value; `None` for one that is not stated, or written by tables of their own.
+pub(super) fn value(slot: &Slot) -> Option<Value> {
+    Some(match slot {
+        Slot::Switch(value) => (**value).into(),
+        Slot::Number(_, value) => (**value).into(),
+        Slot::Given(_, value) => (**value)?.into(),
+        Slot::Choice(Choice { names, chosen, .. }) => names[(*chosen)?].into(),
+        Slot::Direction(value) => vector(**value),
+        Slot::Vector(_, value) => vector((**value)?),
+        Slot::Light(Light::Headlight) => "headlight".into(),
+        Slot::Light(Light::UpperLeft) => "upper-left".into(),
+        Slot::Light(Light::Direction(direction)) => vector(*direction),
+        Slot::Pixels(value) => i64::from(**value).into(),
+        Slot::Background(value) => numbers(**value),
+        Slot::Planes(value) => value.iter().copied().map(numbers).collect::<Vec<_>>().into(),
+        Slot::Crop(value) => (**value)?.map(vector).to_vec().into(),
+        Slot::Colors(value) => ramp(value.as_ref()?, vector),
+        Slot::Shares(_, value) => ramp(value.as_ref()?, Value::from),
+        Slot::Ranges(value) => value.as_ref()?.iter().copied().map(numbers).collect::<Vec<_>>().into(),
+        Slot::Labels(_) => return None,
+        Slot::Label(value) => {
+            (**value).map(|label| i64::try_from(label).map_or(label.to_string().into(), Value::from))?
+        }
+        Slot::Text(_, value) | Slot::Series(value) => value.as_deref()?.into(),
+        Slot::Number32(value) | Slot::Level(value) => i64::from((**value)?).into(),
+        Slot::Dims(value) => (**value)?.to_array().map(i64::from).map(Value::from).to_vec().into(),
+        Slot::Bytes(value) => i64::try_from((**value)?).ok()?.into(),
+    })
+}
+
+/// A ramp as `[position, value]` points.
+fn ramp<T>(ramp: &Ramp<T>, value: impl Fn(T) -> Value) -> Value
+where
+    T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
+{
+    ramp.points().iter().map(|&(at, of)| Value::Array(vec![at.into(), value(of)])).collect::<Vec<_>>().into()
+}
+
+fn vector(vector: DVec3) -> Value {
+    numbers(vector.to_array())
+}
+
+fn numbers(numbers: impl IntoIterator<Item = f64>) -> Value {
+    numbers.into_iter().collect::<Vec<_>>().into()
 }

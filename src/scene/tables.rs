@@ -26,23 +26,26 @@ pub(super) struct ChannelTables<'a> {
     pub(super) states_transfer: bool,
 }
 
+impl<'a> ChannelTables<'a> {
+    /// Takes out `volume` and `transfer` of a channel, or of a file.
+    fn of(section: &mut Section<'a>, channel: Channel) -> Result<Self, SceneError> {
+        let states_transfer = section.states("transfer");
+        let (volume, transfer) = (section.section("volume")?, section.section("transfer")?);
+        Ok(Self { key: section.name.clone(), channel, volume, transfer, states_transfer })
+    }
+}
+
 /// Takes out `[[channel]]`, or `[volume]` and `[transfer]` in its place.
 pub(super) fn channel_tables<'a>(root: &mut Section<'a>) -> Result<Vec<ChannelTables<'a>>, SceneError> {
-    let states_single = ["volume", "transfer"].map(|table| root.states(table));
-    let first = ChannelTables {
-        key: String::new(),
-        channel: Channel::default(),
-        volume: root.section("volume")?,
-        transfer: root.section("transfer")?,
-        states_transfer: states_single[1],
-    };
+    let states_single = root.states("volume") || root.states("transfer");
+    let single = ChannelTables::of(root, Channel::default())?;
     let channels = root.take("channel").map_or(Ok(Vec::new()), |entry| entry.items("tables [[channel]]"))?;
     if channels.is_empty() {
-        return Ok(vec![first]);
+        return Ok(vec![single]);
     }
-    let allowed = "either [[channel]], or [volume] and [transfer]";
-    if states_single != [false; 2] {
+    if states_single {
         let overridden = ["volume", "transfer"].map(|table| root.origins.overrides_within(table)).concat();
+        let allowed = "either [[channel]], or [volume] and [transfer]";
         return Err(root.origins.invalid("channel", &overridden, "both", allowed));
     }
     if channels.len() > MAX_CHANNELS {
@@ -53,11 +56,9 @@ pub(super) fn channel_tables<'a>(root: &mut Section<'a>) -> Result<Vec<ChannelTa
         let mut section = item.section("a table [[channel]]")?;
         let mut channel = Channel::default();
         section.fill(&mut channel)?;
-        let states_transfer = section.states("transfer");
-        let (volume, transfer) = (section.section("volume")?, section.section("transfer")?);
-        let key = section.name.clone();
+        let tables = ChannelTables::of(&mut section, channel)?;
         section.finish()?;
-        Ok(ChannelTables { key, channel, volume, transfer, states_transfer })
+        Ok(tables)
     };
     channels.iter().map(of_channel).collect()
 }
@@ -87,12 +88,8 @@ pub(super) fn channels(
             let allowed = "no such tables, or volume.labels, or volume.builtin = \"head\" or \"tomato\"";
             let related = [key("volume.path"), key("volume.builtin"), key("volume.labels")];
             let found = "tables for a volume without labels";
-            return Err(origins.invalid(
-                &key("transfer.label"),
-                &related.each_ref().map(String::as_str),
-                found,
-                allowed,
-            ));
+            let related = related.each_ref().map(String::as_str);
+            return Err(origins.invalid(&key("transfer.label"), &related, found, allowed));
         }
         channels.push(channel);
     }
@@ -166,7 +163,7 @@ pub(super) fn camera(section: Section, default: Camera) -> Result<Camera, SceneE
 fn transfer(section: Section) -> Result<TransferSettings, SceneError> {
     let (origins, key) = (section.origins, section.name.clone());
     let transfer = section.filled(TransferSettings::default())?;
-    transfer.check_as(&key).map_err(|error| origins.refused(error))?;
+    transfer.parts().check(&key).map_err(|error| origins.refused(error))?;
     if transfer.color.is_some() && transfer.colormap.is_some() {
         let allowed = format!("one of {key}.color and {key}.colormap");
         return Err(origins.invalid(&key, &[], "both color and colormap", allowed));

@@ -3,20 +3,17 @@
 use std::fmt::Write;
 use std::path::{Component, Path, PathBuf};
 
-use glam::DVec3;
 use toml::Value;
 
 use super::keys::{LabelTable, Root, VolumeTable};
-use super::{Channel, Fitting, Scene, SceneError, TransferSettings, VolumeSource};
+use super::{Channel, Fitting, Scene, SceneError, TransferSettings, VolumeSource, slots};
 use crate::appearance::Preset;
 use crate::settings::camera::Camera;
 use crate::settings::camera_table::CameraTable;
 use crate::settings::clip::Clip;
 use crate::settings::economies::TABLE;
-use crate::settings::key::{Choice, Key, Keyed, Slot};
-use crate::settings::light::Light;
+use crate::settings::key::{Key, Keyed, Slot};
 use crate::settings::shading::Shading;
-use crate::settings::transfer_function::Ramp;
 use crate::volume::{RawLayout, is_address};
 
 /// The maximum number of control points written on one line.
@@ -140,10 +137,11 @@ impl Text {
         let mut keys: Vec<&Key<T>> = T::KEYS.iter().collect();
         keys.sort_by_key(|key| first.iter().position(|name| *name == key.name).unwrap_or(first.len()));
         for Key { name, slot, .. } in keys {
-            let value = value(&slot(&mut settings));
-            let is_default = value == self::value(&slot(&mut default));
+            let value = slots::value(&slot(&mut settings));
+            let is_default = value == slots::value(&slot(&mut default));
             if let Some(value) = value.filter(|_| is_kept(name, is_default)) {
-                self.line(name, slot(&mut settings).is_ramp(), &value);
+                let is_ramp = matches!(slot(&mut settings), Slot::Colors(_) | Slot::Shares(..));
+                self.line(name, is_ramp, &value);
             }
         }
     }
@@ -157,52 +155,6 @@ impl Text {
             _ => writeln!(self.text, "{key} = {value}"),
         };
     }
-}
-
-/// A key's value; `None` for one that is not stated, or written by tables of their own.
-pub(super) fn value(slot: &Slot) -> Option<Value> {
-    Some(match slot {
-        Slot::Switch(value) => (**value).into(),
-        Slot::Number(_, value) => (**value).into(),
-        Slot::Given(_, value) => (**value)?.into(),
-        Slot::Choice(Choice { names, chosen, .. }) => names[(*chosen)?].into(),
-        Slot::Direction(value) => vector(**value),
-        Slot::Vector(_, value) => vector((**value)?),
-        Slot::Light(Light::Headlight) => "headlight".into(),
-        Slot::Light(Light::UpperLeft) => "upper-left".into(),
-        Slot::Light(Light::Direction(direction)) => vector(*direction),
-        Slot::Pixels(value) => i64::from(**value).into(),
-        Slot::Background(value) => numbers(**value),
-        Slot::Planes(value) => value.iter().copied().map(numbers).collect::<Vec<_>>().into(),
-        Slot::Crop(value) => (**value)?.map(vector).to_vec().into(),
-        Slot::Colors(value) => ramp(value.as_ref()?, vector),
-        Slot::Shares(_, value) => ramp(value.as_ref()?, Value::from),
-        Slot::Ranges(value) => value.as_ref()?.iter().copied().map(numbers).collect::<Vec<_>>().into(),
-        Slot::Labels(_) => return None,
-        Slot::Label(value) => {
-            (**value).map(|label| i64::try_from(label).map_or(label.to_string().into(), Value::from))?
-        }
-        Slot::Text(_, value) | Slot::Series(value) => value.as_deref()?.into(),
-        Slot::Number32(value) | Slot::Level(value) => i64::from((**value)?).into(),
-        Slot::Dims(value) => (**value)?.to_array().map(i64::from).map(Value::from).to_vec().into(),
-        Slot::Bytes(value) => i64::try_from((**value)?).ok()?.into(),
-    })
-}
-
-/// A ramp as `[position, value]` points.
-fn ramp<T>(ramp: &Ramp<T>, value: impl Fn(T) -> Value) -> Value
-where
-    T: Copy + std::ops::Add<Output = T> + std::ops::Mul<f64, Output = T>,
-{
-    ramp.points().iter().map(|&(at, of)| Value::Array(vec![at.into(), value(of)])).collect::<Vec<_>>().into()
-}
-
-fn vector(vector: DVec3) -> Value {
-    numbers(vector.to_array())
-}
-
-fn numbers(numbers: impl IntoIterator<Item = f64>) -> Value {
-    numbers.into_iter().collect::<Vec<_>>().into()
 }
 
 fn write_transfer(text: &mut Text, transfer: &TransferSettings) {

@@ -4,7 +4,7 @@ use glam::{DMat3, DMat4, DVec2, DVec3, DVec4};
 
 use crate::error::RenderError;
 use crate::error::setting::SettingError;
-use crate::settings::camera::{Camera, Fit, Projection};
+use crate::settings::camera::{Camera, Projection};
 
 /// The maximum relative difference of lengths, and the maximum cosine of right angles: more than the rounding errors of products in f32,
 /// and less than a screen shows.
@@ -57,8 +57,7 @@ fn orthographic([x, y]: [DVec4; 2], pixels: DVec2) -> Result<Camera, RenderError
         direction: up.cross(right).normalize(),
         up: up.normalize(),
         center: Some(center),
-        fit: Fit::Volume,
-        is_eye_open: false,
+        ..Camera::default()
     })
 }
 
@@ -107,8 +106,7 @@ fn perspective([x, y, z, w]: [DVec4; 4], pixels: DVec2) -> Result<Camera, Render
         direction: ahead,
         up: up.normalize(),
         center: Some(eye + distance * ahead),
-        fit: Fit::Volume,
-        is_eye_open: false,
+        ..Camera::default()
     })
 }
 

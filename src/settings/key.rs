@@ -15,21 +15,15 @@ pub(crate) const PIXELS: &str = "an integer from 1 to the device's texture limit
 /// A key of a table.
 pub(crate) struct Key<T> {
     pub(crate) name: &'static str,
-    /// For users, with the unit.
-    #[cfg(feature = "cli")]
+    /// For users, with the unit. Only the program prints sentences; a page's file has none of them.
+    #[cfg_attr(not(feature = "cli"), expect(dead_code, reason = "the program's"))]
     pub(crate) sentence: &'static str,
     pub(crate) slot: for<'a> fn(&'a mut T) -> Slot<'a>,
 }
 
-/// A key, its sentence, and the place of its value. Only the program prints sentences; a page's file has none of them.
-#[cfg_attr(not(feature = "cli"), expect(unused_variables, reason = "sentences are the program's"))]
+/// A key, its sentence, and the place of its value.
 pub(crate) const fn key<T>(name: &'static str, sentence: &'static str, slot: fn(&mut T) -> Slot<'_>) -> Key<T> {
-    Key {
-        name,
-        #[cfg(feature = "cli")]
-        sentence,
-        slot,
-    }
+    Key { name, sentence: if cfg!(feature = "cli") { sentence } else { "" }, slot }
 }
 
 /// The settings of a table, whose defaults are the table's.
@@ -85,11 +79,6 @@ pub(crate) enum Slot<'a> {
 }
 
 impl Slot<'_> {
-    /// Whether it holds control points.
-    pub(crate) fn is_ramp(&self) -> bool {
-        matches!(self, Self::Colors(_) | Self::Shares(..))
-    }
-
     /// Checks the range of a single value; an error's key is the element's index alone, or empty.
     fn check(&self) -> Result<(), SettingError> {
         match self {
@@ -101,6 +90,17 @@ impl Slot<'_> {
             Self::Pixels(0) => Err(SettingError::new("", 0.0, PIXELS)),
             Self::Background(color) => Interval::SHARE.check_each("", &color[..]),
             _ => Ok(()),
+        }
+    }
+
+    /// Takes over the value of the same key of other settings, if it is one that a preset may choose.
+    pub(crate) fn take_over(self, other: Slot) {
+        match (self, other) {
+            (Self::Switch(value), Slot::Switch(other)) => *value = *other,
+            (Self::Number(_, value), Slot::Number(_, other)) => *value = *other,
+            (Self::Light(value), Slot::Light(other)) => *value = *other,
+            (Self::Choice(Choice { mut choose, .. }), Slot::Choice(Choice { chosen: Some(at), .. })) => choose(at),
+            _ => {}
         }
     }
 }
@@ -115,22 +115,19 @@ pub(crate) struct Choice<'a> {
 
 /// The place of a choice.
 pub(crate) fn choice<'a, T: Copy + PartialEq>(all: &'static [(&'static str, T)], place: &'a mut T) -> Slot<'a> {
-    choice_of(all, Some(*place), move |choice| *place = choice)
+    choice_of(all, Some(*place), move |at| *place = all[at].1)
 }
 
 /// The place of a choice that may be missing.
 pub(crate) fn chosen<'a, T: Copy + PartialEq>(all: &'static [(&'static str, T)], place: &'a mut Option<T>) -> Slot<'a> {
-    choice_of(all, *place, move |choice| *place = Some(choice))
+    choice_of(all, *place, move |at| *place = Some(all[at].1))
 }
 
-fn choice_of<'a, T: Copy + PartialEq>(
-    all: &'static [(&'static str, T)],
+fn choice_of<'a, T: PartialEq>(
+    all: &[(&'static str, T)],
     value: Option<T>,
-    mut set: impl FnMut(T) + 'a,
+    choose: impl FnMut(usize) + 'a,
 ) -> Slot<'a> {
-    Slot::Choice(Choice {
-        names: all.iter().map(|(name, _)| *name).collect(),
-        chosen: all.iter().position(|(_, choice)| Some(*choice) == value),
-        choose: Box::new(move |at| set(all[at].1)),
-    })
+    let chosen = all.iter().position(|(_, choice)| value.as_ref() == Some(choice));
+    Slot::Choice(Choice { names: all.iter().map(|(name, _)| *name).collect(), chosen, choose: Box::new(choose) })
 }

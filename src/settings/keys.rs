@@ -2,17 +2,17 @@
 
 use std::ops::Bound::{Excluded, Included};
 
+use super::camera::Fit;
 use super::camera_table::CameraTable;
 use super::clip::Clip;
 use super::economies::Economies;
 use super::key::Slot::{Crop, Direction, Given, Light, Number, Planes, Switch, Vector};
 use super::key::{Key, Keyed, choice, key};
-use super::names::{
-    BOXES, CLASSIFICATIONS, COMPOSITINGS, FITS, FORMS, GRADIENTS, INTERPOLATIONS, METHODS, ORDERS, PROFILES,
-    PROJECTIONS, RASTERIZERS,
+use super::shading::{Gradient, Shading};
+use super::splatting::{
+    Classification, Compositing, FootprintBox, FootprintForm, Interpolation, Method, Order, Rasterizer, SlabProfile,
+    Splatting,
 };
-use super::shading::Shading;
-use super::splatting::Splatting;
 use crate::error::setting::Interval;
 
 const FOV_Y: Interval = Interval::new(Excluded(0.0), Excluded(180.0)).of("degrees");
@@ -21,6 +21,35 @@ const LIGHT_STEP: Interval = Interval::new(Included(0.5), Included(16.0));
 const RADIUS: Interval = Interval::new(Included(1.0), Included(4.0));
 const FALLOFF: Interval = Interval::new(Excluded(0.0), Included(16.0));
 const SLAB_WIDTH: Interval = Interval::new(Included(0.05), Included(8.0));
+
+pub(crate) const FITS: &[(&str, Fit)] = &[("volume", Fit::Volume), ("object", Fit::Object)];
+pub(crate) const METHODS: &[(&str, Method)] = &[
+    ("image-aligned", Method::ImageAligned),
+    ("axis-aligned", Method::AxisAligned),
+    ("composite-every-sample", Method::CompositeEverySample),
+];
+pub(crate) const CLASSIFICATIONS: &[(&str, Classification)] =
+    &[("before", Classification::Before), ("after", Classification::After)];
+pub(crate) const INTERPOLATIONS: &[(&str, Interpolation)] =
+    &[("smooth", Interpolation::Smooth), ("exact", Interpolation::Exact), ("auto", Interpolation::Auto)];
+/// Whether a label's normals are those of its membership.
+pub(crate) const LABEL_GRADIENTS: &[(&str, bool)] = &[("differences", false), ("membership", true)];
+pub(crate) const PROFILES: &[(&str, SlabProfile)] = &[("linear", SlabProfile::Linear), ("cubic", SlabProfile::Cubic)];
+pub(crate) const GRADIENTS: &[(&str, Gradient)] =
+    &[("differences", Gradient::Differences), ("kernel", Gradient::Kernel), ("membership", Gradient::Membership)];
+pub(crate) const FORMS: &[(&str, FootprintForm)] =
+    &[("summed-area", FootprintForm::SummedArea), ("sections", FootprintForm::Sections)];
+pub(crate) const COMPOSITINGS: &[(&str, Compositing)] = &Compositing::ALL;
+/// Whether rays run through an eye.
+pub(crate) const PROJECTIONS: &[(&str, bool)] = &[("orthographic", false), ("perspective", true)];
+/// Whether the most significant byte of a sample comes first.
+pub(crate) const ENDIANS: &[(&str, bool)] = &[("little", false), ("big", true)];
+pub(crate) const ORDERS: &[(&str, Order)] =
+    &[("front-to-back", Order::FrontToBack), ("back-to-front", Order::BackToFront)];
+pub(crate) const RASTERIZERS: &[(&str, Rasterizer)] =
+    &[("auto", Rasterizer::Auto), ("quads", Rasterizer::Quads), ("tiles", Rasterizer::Tiles)];
+pub(crate) const BOXES: &[(&str, FootprintBox)] =
+    &[("rectangle", FootprintBox::Rectangle), ("parallelogram", FootprintBox::Parallelogram)];
 
 impl Keyed for CameraTable {
     const KEYS: &'static [Key<Self>] = &[
@@ -111,4 +140,9 @@ impl Keyed for Economies {
         key("beta", "Voxels behind this opacity are projected whole", |e| Number(Interval::THRESHOLD, &mut e.beta)),
         key("resolution", "The least alpha that a footprint adds", |e| Number(Interval::SHARE, &mut e.resolution)),
     ];
+}
+
+/// The name of a choice.
+pub(crate) fn name_of<T: Copy + PartialEq>(choices: &[(&'static str, T)], choice: T) -> &'static str {
+    choices.iter().find(|(_, other)| *other == choice).map_or("", |(name, _)| name)
 }

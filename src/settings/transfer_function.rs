@@ -136,7 +136,9 @@ impl LabelTables {
     /// # Errors
     /// If a colour, opacity or factor is not in [0, 1].
     pub fn check(&self, key: &str) -> Result<(), SettingError> {
-        check_ramps(key, self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref())
+        let (color, opacity, gradient_opacity) =
+            (self.color.as_ref(), self.opacity.as_ref(), self.gradient_opacity.as_ref());
+        Parts { color, opacity, gradient_opacity, ..Parts::default() }.check(key)
     }
 
     /// Whether these tables change the appearance of voxels; otherwise they only decide which voxels take part.
@@ -217,22 +219,57 @@ fn check_length(key: &str, count: usize, most: usize) -> Result<(), SettingError
     Ok(())
 }
 
-/// The parts of a channel's tables that determine their pieces; `None` stands for a short ramp that is chosen from the volume.
+/// A channel's tables, with its labels' by their numbers; `None` stands for a short ramp that is chosen from the volume.
+#[derive(Default)]
 pub(crate) struct Parts<'a> {
     pub(crate) color: Option<&'a Ramp<DVec3>>,
     pub(crate) opacity: Option<&'a Ramp<f64>>,
+    pub(crate) gradient_opacity: Option<&'a Ramp<f64>>,
     pub(crate) iso_ranges: Option<&'a [[f64; 2]]>,
-    pub(crate) labels: Vec<&'a LabelTables>,
+    pub(crate) labels: Vec<(u64, &'a LabelTables)>,
+}
+
+impl Parts<'_> {
+    /// Checks that the values of ramps are in [0, 1], that the list of intervals is not empty, that these are finite and not reversed, and that nothing is too
+    /// long; `Ramp` itself checks its positions.
+    pub(crate) fn check(&self, table: &str) -> Result<(), SettingError> {
+        let colors = self.color.map_or(&[][..], Ramp::points);
+        check_length(&format!("{table}.color"), colors.len(), MAX_COLORS)?;
+        for (at, (_, rgb)) in colors.iter().enumerate() {
+            Interval::SHARE.check_each(&format!("{table}.color[{at}][1]"), &rgb.to_array())?;
+        }
+        for (name, ramp) in [("opacity", self.opacity), ("gradient_opacity", self.gradient_opacity)] {
+            let shares = ramp.map_or(&[][..], Ramp::points);
+            check_length(&format!("{table}.{name}"), shares.len(), MAX_POINTS)?;
+            for (at, &(_, share)) in shares.iter().enumerate() {
+                Interval::SHARE.check(&format!("{table}.{name}[{at}][1]"), share)?;
+            }
+        }
+        let list = format!("{table}.iso_ranges");
+        if self.iso_ranges.is_some_and(<[_]>::is_empty) {
+            return Err(SettingError::new(list, "[]", "an array of one or more [lo, hi]"));
+        }
+        let ranges = self.iso_ranges.unwrap_or_default();
+        check_length(&list, ranges.len(), MAX_POINTS)?;
+        for (at, range) in ranges.iter().enumerate() {
+            let key = format!("{list}[{at}]");
+            Interval::FINITE.check_each(&key, range)?;
+            if range[0] > range[1] {
+                return Err(SettingError::new(key, &range[..], "[lo, hi] with lo <= hi"));
+            }
+        }
+        self.labels.iter().try_for_each(|(label, tables)| tables.check(&format!("{table}.label[{label}]")))
+    }
 }
 
 /// Checks that the tables of all channels have a bounded number of pieces: those of a channel count again for each label that uses them.
 pub(crate) fn check_pieces<'a>(table: &str, channels: impl Iterator<Item = Parts<'a>>) -> Result<(), SettingError> {
     let of_opacity = |ramp: Option<&Ramp<f64>>| ramp.map_or(1, opacity_pieces);
     let of_color = |ramp: Option<&Ramp<DVec3>>| ramp.map_or(1, |ramp| ramp.points().len());
-    let of_channel = |Parts { color, opacity, iso_ranges, labels }: Parts| {
+    let of_channel = |Parts { color, opacity, iso_ranges, labels, .. }: Parts| {
         let (opacities, colors) = (of_opacity(opacity), of_color(color));
         let ends = 2 * iso_ranges.map_or(0, <[_]>::len);
-        let of_label = |own: &LabelTables| {
+        let of_label = |(_, own): (u64, &LabelTables)| {
             let opacities = own.opacity.as_ref().map_or(opacities, opacity_pieces);
             opacities + own.color.as_ref().map_or(colors, |ramp| ramp.points().len()) + ends
         };
@@ -261,55 +298,6 @@ fn opacity_pieces(ramp: &Ramp<f64>) -> usize {
     ramp.points().len() + ramp.points().windows(2).map(cuts).sum::<usize>()
 }
 
-/// Checks that the values of a table's ramps are in [0, 1], and that these are not too long; `Ramp` itself checks their positions.
-pub(crate) fn check_ramps(
-    table: &str,
-    color: Option<&Ramp<DVec3>>,
-    opacity: Option<&Ramp<f64>>,
-    gradient_opacity: Option<&Ramp<f64>>,
-) -> Result<(), SettingError> {
-    check_length(&format!("{table}.color"), color.map_or(0, |ramp| ramp.points().len()), MAX_COLORS)?;
-    for (at, (_, rgb)) in color.iter().flat_map(|ramp| ramp.points()).enumerate() {
-        Interval::SHARE.check_each(&format!("{table}.color[{at}][1]"), &rgb.to_array())?;
-    }
-    for (name, ramp) in [("opacity", opacity), ("gradient_opacity", gradient_opacity)] {
-        check_length(&format!("{table}.{name}"), ramp.map_or(0, |ramp| ramp.points().len()), MAX_POINTS)?;
-        for (at, &(_, share)) in ramp.iter().flat_map(|ramp| ramp.points()).enumerate() {
-            Interval::SHARE.check(&format!("{table}.{name}[{at}][1]"), share)?;
-        }
-    }
-    Ok(())
-}
-
-/// Checks the tables of labels, each behind its number.
-pub(crate) fn check_labels(
-    table: &str,
-    labels: &mut dyn Iterator<Item = (u64, &LabelTables)>,
-) -> Result<(), SettingError> {
-    for (label, tables) in labels {
-        tables.check(&format!("{table}.label[{label}]"))?;
-    }
-    Ok(())
-}
-
-/// Checks that the list of intervals, if stated, is not empty, and that intervals are finite and not reversed.
-pub(crate) fn check_iso_ranges(table: &str, iso_ranges: Option<&[[f64; 2]]>) -> Result<(), SettingError> {
-    let list = format!("{table}.iso_ranges");
-    let Some(ranges) = iso_ranges else { return Ok(()) };
-    if ranges.is_empty() {
-        return Err(SettingError::new(list, "[]", "an array of one or more [lo, hi]"));
-    }
-    check_length(&list, ranges.len(), MAX_POINTS)?;
-    for (at, range) in ranges.iter().enumerate() {
-        let key = format!("{list}[{at}]");
-        Interval::FINITE.check_each(&key, range)?;
-        if range[0] > range[1] {
-            return Err(SettingError::new(key, &range[..], "[lo, hi] with lo <= hi"));
-        }
-    }
-    Ok(())
-}
-
 impl TransferFunction {
     /// Checks that the values are in range.
     ///
@@ -324,22 +312,23 @@ impl TransferFunction {
     /// [`Self::check`] of the transfer functions of several channels.
     pub(crate) fn check_channels(channels: &[Self]) -> Result<(), SettingError> {
         for (number, of) in channels.iter().enumerate() {
-            of.check_as(&if number == 0 { "transfer".to_owned() } else { format!("channel[{number}].transfer") })?;
+            of.parts().check(&if number == 0 {
+                "transfer".to_owned()
+            } else {
+                format!("channel[{number}].transfer")
+            })?;
         }
         check_pieces("transfer", channels.iter().map(Self::parts))
     }
 
-    /// [`Self::check`] of one channel, whose tables have a name in errors.
-    pub(crate) fn check_as(&self, table: &str) -> Result<(), SettingError> {
-        check_ramps(table, Some(&self.color), Some(&self.opacity), self.gradient_opacity.as_ref())?;
-        check_iso_ranges(table, self.iso_ranges.as_deref())?;
-        check_labels(table, &mut self.labels.iter().map(|(&label, tables)| (label.into(), tables)))
-    }
-
-    fn parts(&self) -> Parts<'_> {
-        let Self { color, opacity, iso_ranges, labels, .. } = self;
-        let labels = labels.values().collect();
-        Parts { color: Some(color), opacity: Some(opacity), iso_ranges: iso_ranges.as_deref(), labels }
+    pub(crate) fn parts(&self) -> Parts<'_> {
+        Parts {
+            color: Some(&self.color),
+            opacity: Some(&self.opacity),
+            gradient_opacity: self.gradient_opacity.as_ref(),
+            iso_ranges: self.iso_ranges.as_deref(),
+            labels: self.labels.iter().map(|(&label, tables)| (label.into(), tables)).collect(),
+        }
     }
 
     /// A transfer function with only colour and opacity.
