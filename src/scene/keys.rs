@@ -13,6 +13,9 @@ use crate::settings::keys::{ENDIANS, LABEL_GRADIENTS};
 use crate::settings::transfer_function::LabelTables;
 use crate::volume::{SPACING, SampleType};
 
+/// The points of opacities by gradients, for errors.
+const BY_GRADIENT: &str = "[gradient magnitude, factor]";
+
 /// The keys outside all tables.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Root {
@@ -20,8 +23,7 @@ pub(super) struct Root {
 }
 
 impl Keyed for Root {
-    const KEYS: &'static [Key<Self>] =
-        &[key("preset", "The kind of data, by default what fits", |r| chosen(&Preset::ALL, &mut r.preset))];
+    const KEYS: &'static [Key<Self>] = &[key!(preset, chosen(&Preset::ALL), "The kind of data, by default what fits")];
 }
 
 /// `[volume]`.
@@ -41,45 +43,39 @@ pub(super) struct VolumeTable {
 
 impl Keyed for VolumeTable {
     const KEYS: &'static [Key<Self>] = &[
-        key("path", "Relative to the scene file", |v| Text("a volume file's path", &mut v.path)),
-        key("builtin", "In place of path", |v| Text("a builtin volume's name", &mut v.builtin)),
-        key("spacing", "Overrides the file's, in world units", |v| Vector(SPACING, &mut v.channel.spacing)),
-        key("labels", "A file with a label for every voxel", |v| Text("a label file's path", &mut v.labels)),
+        key!(path, Text("a volume file's path"), "The volume's file, relative to the scene file"),
+        key!(builtin, Text("a builtin volume's name"), "A builtin volume, in place of path"),
+        key!("spacing", channel.spacing, Vector(SPACING), "The distances of voxels, in place of the file's"),
+        key!(labels, Text("a label file's path"), "A file with a label for every voxel"),
         #[cfg(not(target_arch = "wasm32"))]
-        key("label_table", "The labels' names and colours", |v| {
-            Text("a table's path, or builtin:freesurfer", &mut v.label_table)
-        }),
-        key("index", "The only channel that is read, counted from 0", |v| Number32(&mut v.channel.index)),
-        key("time", "The time that is read, counted from 0", |v| Number32(&mut v.channel.time)),
-        key("level", "The level of a store, from 0 for the finest", |v| Level(&mut v.channel.level)),
-        key("series", "Which series of a DICOM folder is read", |v| Series(&mut v.channel.series)),
-        key("dims", "The voxels of a file without a header", |v| Dims(&mut v.dims)),
-        key("type", "The type of its samples", |v| chosen(&SampleType::NAMED, &mut v.sample_type)),
-        key("endian", "The order of the bytes of a sample", |v| chosen(ENDIANS, &mut v.big_endian)),
-        key("offset", "Bytes before the first sample", |v| Bytes(&mut v.offset)),
+        key!(label_table, Text("a table's path, or builtin:freesurfer"), "A table of the labels' names and colours"),
+        key!("index", channel.index, Number32, "The only channel that is read, counted from 0"),
+        key!("time", channel.time, Number32, "The time that is read, counted from 0"),
+        key!("level", channel.level, Level, "The level of a store, from 0 for the finest"),
+        key!("series", channel.series, Series, "The series of a DICOM folder, by number or identity"),
+        key!(dims, Dims, "Voxels along x, y and z of a file without a header"),
+        key!("type", sample_type, chosen(&SampleType::NAMED), "The type of samples without a header"),
+        key!("endian", big_endian, chosen(ENDIANS), "The order of the bytes of samples without a header"),
+        key!(offset, Bytes, "Bytes before the first sample without a header"),
     ];
 }
 
 impl Keyed for ImageSettings {
     const KEYS: &'static [Key<Self>] = &[
-        key("width", "Pixels per row", |i| Pixels(&mut i.width)),
-        key("height", "Rows of pixels", |i| Pixels(&mut i.height)),
-        key("background", "Red, green, blue and straight alpha", |i| Background(&mut i.background)),
+        key!(width, Pixels, "Pixels per row"),
+        key!(height, Pixels, "Rows of pixels"),
+        key!(background, Background, "Red, green, blue and straight alpha"),
     ];
 }
 
 impl Keyed for TransferSettings {
     const KEYS: &'static [Key<Self>] = &[
-        key("color", "Points [value, [r, g, b]]", |t| Colors(&mut t.color)),
-        key("opacity", "Points [value, opacity], per smallest voxel spacing", |t| {
-            Shares("[value, opacity]", &mut t.opacity)
-        }),
-        key("gradient_opacity", "Points [gradient magnitude, factor of the opacity]", |t| {
-            Shares("[gradient magnitude, factor]", &mut t.gradient_opacity)
-        }),
-        key("iso_ranges", "The values that take part, [lo, hi]", |t| Ranges(&mut t.iso_ranges)),
-        key("label", "Tables of single labels", |t| Labels(&mut t.labels)),
-        key("colormap", "In place of color, over the visible values", |t| chosen(&Colormap::ALL, &mut t.colormap)),
+        key!(color, Colors, "Points [value, [r, g, b]]"),
+        key!(opacity, Shares("[value, opacity]"), "Points [value, opacity], per smallest voxel spacing"),
+        key!(gradient_opacity, Shares(BY_GRADIENT), "Points [gradient magnitude, factor of the opacity]"),
+        key!(iso_ranges, Ranges, "The values that take part, [lo, hi]"),
+        key!("label", labels, Labels, "Tables of single labels"),
+        key!(colormap, chosen(&Colormap::ALL), "In place of color, over the visible values"),
     ];
 }
 
@@ -92,22 +88,18 @@ pub(super) struct LabelTable {
 
 impl Keyed for LabelTable {
     const KEYS: &'static [Key<Self>] = &[
-        key("label", "The label's number in the file", |l| Label(&mut l.label)),
-        key("visible", "Whether the label's voxels take part", |l| Switch(&mut l.tables.visible)),
-        key("color", "In place of transfer.color", |l| Colors(&mut l.tables.color)),
-        key("opacity", "In place of transfer.opacity", |l| Shares("[value, opacity]", &mut l.tables.opacity)),
-        key("gradient_opacity", "In place of transfer.gradient_opacity", |l| {
-            Shares("[gradient magnitude, factor]", &mut l.tables.gradient_opacity)
-        }),
-        key("gradient", "What gives normals: membership, the label's own shape, not with classification after", |l| {
-            choice(LABEL_GRADIENTS, &mut l.tables.membership)
-        }),
+        key!(label, Label, "The label's number in the file"),
+        key!("visible", tables.visible, Switch, "Whether the label's voxels take part"),
+        key!("color", tables.color, Colors, "In place of transfer.color"),
+        key!("opacity", tables.opacity, Shares("[value, opacity]"), "In place of transfer.opacity"),
+        key!("gradient_opacity", tables.gradient_opacity, Shares(BY_GRADIENT), "In place of transfer.gradient_opacity"),
+        key!("gradient", tables.membership, choice(LABEL_GRADIENTS), "Membership: normals of the label's own shape"),
     ];
 }
 
 impl Keyed for Channel {
     const KEYS: &'static [Key<Self>] = &[
-        key("name", "In legends and picks", |c| Text("a name", &mut c.name)),
-        key("visible", "Whether the channel is drawn", |c| Switch(&mut c.visible)),
+        key!(name, Text("a name"), "The name in legends and picks"),
+        key!(visible, Switch, "Whether the channel is drawn"),
     ];
 }

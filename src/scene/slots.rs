@@ -20,6 +20,9 @@ use crate::volume::{SIZES, dims_of};
 /// The allowed labels, for errors.
 const LABEL: &str = "an integer >= 0, from 2⁶³ on in quotes";
 
+/// The allowed levels, for errors.
+const LEVEL: &str = "an integer >= 0 or \"auto\"";
+
 /// The allowed integers that count something, for errors.
 const COUNT: &str = "an integer >= 0";
 
@@ -85,24 +88,18 @@ fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
             *into = Some(text.to_owned());
         }
         Slot::Number32(into) => *into = Some(entry.integer(COUNT)?),
-        Slot::Level(into) => {
-            let allowed = "an integer >= 0 or \"auto\"";
-            *into = match entry.value.as_str() {
-                Some("auto") => None,
-                Some(_) => return Err(entry.refused(allowed)),
-                None => Some(entry.integer(allowed)?),
-            };
-        }
+        Slot::Level(into) => match entry.value.as_str() {
+            Some("auto") => *into = None,
+            Some(_) => return Err(entry.refused(LEVEL)),
+            None => *into = Some(entry.integer(LEVEL)?),
+        },
         Slot::Series(into) => {
             let number = || entry.integer::<u32>("an integer >= 0, or a SeriesInstanceUID in quotes");
             let text = entry.value.as_str().map(str::to_owned);
             *into = Some(text.map_or_else(|| number().map(|number| number.to_string()), Ok)?);
         }
         Slot::Dims(into) => {
-            let [x, y, z] = entry.array::<3>(SIZES)?.map(|size| {
-                // Sizes that are too large are told by all three.
-                size.value.as_integer().ok_or_else(|| size.mistyped(SIZES))
-            });
+            let [x, y, z] = entry.array::<3>(SIZES)?.map(|size| size.integer::<i64>(SIZES));
             *into = Some(dims_of([x?, y?, z?]).ok_or_else(|| entry.refused(SIZES))?);
         }
         Slot::Bytes(into) => *into = Some(entry.integer(COUNT)?),

@@ -21,10 +21,22 @@ pub(crate) struct Key<T> {
     pub(crate) slot: for<'a> fn(&'a mut T) -> Slot<'a>,
 }
 
-/// A key, its sentence, and the place of its value.
-pub(crate) const fn key<T>(name: &'static str, sentence: &'static str, slot: fn(&mut T) -> Slot<'_>) -> Key<T> {
-    Key { name, sentence: if cfg!(feature = "cli") { sentence } else { "" }, slot }
+impl<T> Key<T> {
+    pub(crate) const fn new(name: &'static str, sentence: &'static str, slot: fn(&mut T) -> Slot<'_>) -> Self {
+        Self { name, sentence: if cfg!(feature = "cli") { sentence } else { "" }, slot }
+    }
 }
+
+/// A key: its name, the field of its value if that has another one, its type and range, and its sentence.
+macro_rules! key {
+    ($name:ident, $slot:ident $(($($argument:expr),+))?, $sentence:literal) => {
+        key!(stringify!($name), $name, $slot $(($($argument),+))?, $sentence)
+    };
+    ($name:expr, $($field:ident).+, $slot:ident $(($($argument:expr),+))?, $sentence:literal) => {
+        Key::new($name, $sentence, |settings| $slot($($($argument,)+)? &mut settings.$($field).+))
+    };
+}
+pub(crate) use key;
 
 /// The settings of a table, whose defaults are the table's.
 pub(crate) trait Keyed: Clone + Default + 'static {
@@ -34,13 +46,11 @@ pub(crate) trait Keyed: Clone + Default + 'static {
     /// Checks that each value is in range; `table` is the table's full key.
     fn check_keys(&self, table: &str) -> Result<(), SettingError> {
         let mut settings = self.clone();
-        Self::KEYS.iter().try_for_each(|key| {
-            let checked = (key.slot)(&mut settings).check();
-            let name = key.name;
-            checked.map_err(|SettingError { key: element, found, allowed, .. }| {
-                SettingError::new(format!("{table}.{name}{element}"), found, allowed)
-            })
-        })
+        for Key { name, slot, .. } in Self::KEYS {
+            let error = |of: SettingError| SettingError::new(format!("{table}.{name}{}", of.key), of.found, of.allowed);
+            slot(&mut settings).check().map_err(error)?;
+        }
+        Ok(())
     }
 }
 
@@ -123,11 +133,7 @@ pub(crate) fn chosen<'a, T: Copy + PartialEq>(all: &'static [(&'static str, T)],
     choice_of(all, *place, move |at| *place = Some(all[at].1))
 }
 
-fn choice_of<'a, T: PartialEq>(
-    all: &[(&'static str, T)],
-    value: Option<T>,
-    choose: impl FnMut(usize) + 'a,
-) -> Slot<'a> {
-    let chosen = all.iter().position(|(_, choice)| value.as_ref() == Some(choice));
+fn choice_of<'a, T: PartialEq>(all: &[(&'static str, T)], of: Option<T>, choose: impl FnMut(usize) + 'a) -> Slot<'a> {
+    let chosen = all.iter().position(|(_, choice)| of.as_ref() == Some(choice));
     Slot::Choice(Choice { names: all.iter().map(|(name, _)| *name).collect(), chosen, choose: Box::new(choose) })
 }

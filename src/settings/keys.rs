@@ -53,92 +53,68 @@ pub(crate) const BOXES: &[(&str, FootprintBox)] =
 
 impl Keyed for CameraTable {
     const KEYS: &'static [Key<Self>] = &[
-        key("projection", "Parallel rays, or rays through the eye", |c| choice(PROJECTIONS, &mut c.is_perspective)),
-        key("direction", "From the eye into the scene", |c| Direction(&mut c.camera.direction)),
-        key("up", "Up on the screen, not parallel to direction", |c| Direction(&mut c.camera.up)),
-        key("center", "The world point at the image's centre", |c| Vector(Interval::FINITE, &mut c.camera.center)),
-        key("fit", "What the keys that are not stated show", |c| choice(FITS, &mut c.camera.fit)),
-        key("height", "World units over the image's height", |c| Given(Interval::POSITIVE, &mut c.height)),
-        key("fov_y", "Perspective: degrees over the image's height", |c| Number(FOV_Y, &mut c.fov_y)),
-        key("distance", "Perspective: world units from the eye to center", |c| {
-            Given(Interval::POSITIVE, &mut c.distance)
-        }),
-        key("near", "Perspective: world units to the near plane", |c| Given(Interval::POSITIVE, &mut c.near)),
+        key!("projection", is_perspective, choice(PROJECTIONS), "Parallel rays, or rays through an eye"),
+        key!("direction", camera.direction, Direction, "The way from the eye into the scene"),
+        key!("up", camera.up, Direction, "Up on the screen; not parallel to direction"),
+        key!("center", camera.center, Vector(Interval::FINITE), "The world point at the image's centre"),
+        key!("fit", camera.fit, choice(FITS), "Which box fills the picture: all, or all visible"),
+        key!(height, Given(Interval::POSITIVE), "World units over the image's height"),
+        key!(fov_y, Number(FOV_Y), "Perspective: degrees over the image's height"),
+        key!(distance, Given(Interval::POSITIVE), "Perspective: world units from the eye to center"),
+        key!(near, Given(Interval::POSITIVE), "Perspective: world units to the near plane"),
     ];
 }
 
 impl Keyed for Clip {
     const KEYS: &'static [Key<Self>] = &[
-        key("planes", "Planes [nx, ny, nz, d], which keep n·p + d ≥ 0, in world units", |c| Planes(&mut c.planes)),
-        key("crop", "The lower and the upper corner of the box that is kept, in world units", |c| Crop(&mut c.crop)),
-        key("shade_faces", "Whether cut faces are shaded, or show the slice's own colours", |c| {
-            Switch(&mut c.shade_faces)
-        }),
+        key!(planes, Planes, "Planes [nx, ny, nz, d], which keep n·p + d ≥ 0, in world units"),
+        key!(crop, Crop, "The lower and the upper corner of the box that is kept, in world units"),
+        key!(shade_faces, Switch, "Whether cut faces are shaded, or show the slice's own colours"),
     ];
 }
 
 impl Keyed for Shading {
     const KEYS: &'static [Key<Self>] = &[
-        key("enabled", "Whether voxels are shaded", |s| Switch(&mut s.enabled)),
-        key("light", "The direction towards the light", |s| Light(&mut s.light)),
-        key("ambient", "The share of the colour without light", |s| Number(Interval::NOT_NEGATIVE, &mut s.ambient)),
-        key("diffuse", "The weight of diffuse light", |s| Number(Interval::NOT_NEGATIVE, &mut s.diffuse)),
-        key("specular", "The weight of the highlight", |s| Number(Interval::NOT_NEGATIVE, &mut s.specular)),
-        key("shininess", "The exponent of the highlight", |s| Number(Interval::POSITIVE, &mut s.shininess)),
-        key(
-            "gradient",
-            "What gives normals: kernel only with classification after, membership only for label maps",
-            |s| choice(GRADIENTS, &mut s.gradient),
-        ),
-        key("occlusion", "How much matter in front dims ambient light", |s| Number(Interval::SHARE, &mut s.occlusion)),
-        key("occlusion_spread", "How far ambient light spreads, in squared smallest voxel spacings per spacing", |s| {
-            Number(LIGHT_SPREAD, &mut s.occlusion_spread)
-        }),
-        key("shadow", "How much matter towards the light dims other light", |s| Number(Interval::SHARE, &mut s.shadow)),
-        key("shadow_spread", "How soft shadows are, in squared smallest voxel spacings per spacing", |s| {
-            Number(LIGHT_SPREAD, &mut s.shadow_spread)
-        }),
-        key("light_step", "The distance of light sheets, in smallest voxel spacings", |s| {
-            Number(LIGHT_STEP, &mut s.light_step)
-        }),
+        key!(enabled, Switch, "Whether voxels are shaded"),
+        key!(light, Light, "The direction towards the light"),
+        key!(ambient, Number(Interval::NOT_NEGATIVE), "The part of the colour that needs no light"),
+        key!(diffuse, Number(Interval::NOT_NEGATIVE), "The weight of diffuse light"),
+        key!(specular, Number(Interval::NOT_NEGATIVE), "The weight of the highlight"),
+        key!(shininess, Number(Interval::POSITIVE), "The exponent of the highlight"),
+        key!(gradient, choice(GRADIENTS), "Where normals come from; kernel is for classification after"),
+        key!(occlusion, Number(Interval::SHARE), "How much matter in front dims ambient light"),
+        key!(occlusion_spread, Number(LIGHT_SPREAD), "Spread of ambient light: smallest spacings² per spacing"),
+        key!(shadow, Number(Interval::SHARE), "How much matter towards the light dims other light"),
+        key!(shadow_spread, Number(LIGHT_SPREAD), "Softness of shadows: smallest spacings² per spacing"),
+        key!(light_step, Number(LIGHT_STEP), "The distance of light sheets, in smallest voxel spacings"),
     ];
 }
 
 impl Keyed for Splatting {
     const KEYS: &'static [Key<Self>] = &[
-        key("method", "Which voxels share a sheet", |s| choice(METHODS, &mut s.method)),
-        key("radius", "The kernel's radius, in voxels", |s| Number(RADIUS, &mut s.radius)),
-        key("falloff", "The exponent of the kernel's Gaussian", |s| Number(FALLOFF, &mut s.falloff)),
-        key("slab_width", "In smallest voxel spacings along a ray", |s| Number(SLAB_WIDTH, &mut s.slab_width)),
-        key("slab_profile", "How values run between slab planes, with classification after", |s| {
-            choice(PROFILES, &mut s.slab_profile)
-        }),
-        key("classification", "Whether voxels are classified, or what a pixel sees of them", |s| {
-            choice(CLASSIFICATIONS, &mut s.classification)
-        }),
-        key("interpolation", "Whether each voxel keeps its exact value, with classification after", |s| {
-            choice(INTERPOLATIONS, &mut s.interpolation)
-        }),
-        key("footprint", "How kernel sections are stored", |s| choice(FORMS, &mut s.footprint)),
-        key("compositing", "How sheets become a pixel", |s| choice(COMPOSITINGS, &mut s.compositing)),
-        key("order", "The order of the sheets", |s| choice(ORDERS, &mut s.order)),
-        key("opacity_threshold", "The opacity from which a pixel hides what is behind it", |s| {
-            Number(Interval::THRESHOLD, &mut s.opacity_threshold)
-        }),
-        key("culling", "Whether hidden voxels are left out", |s| Switch(&mut s.culling)),
-        key("tiles", "Whether only tiles that a group of sheets touches are composited", |s| Switch(&mut s.tiles)),
-        key("rasterizer", "How the GPU draws kernel sections", |s| choice(RASTERIZERS, &mut s.rasterizer)),
-        key("footprint_box", "The pixels that culling tests", |s| choice(BOXES, &mut s.footprint_box)),
+        key!(method, choice(METHODS), "Which voxels share a sheet"),
+        key!(radius, Number(RADIUS), "The kernel's radius, in voxels"),
+        key!(falloff, Number(FALLOFF), "The exponent of the kernel's Gaussian"),
+        key!(slab_width, Number(SLAB_WIDTH), "Along a ray, in smallest voxel spacings"),
+        key!(slab_profile, choice(PROFILES), "How values run between slab planes, with classification after"),
+        key!(classification, choice(CLASSIFICATIONS), "Whether voxels are classified, or what a pixel sees of them"),
+        key!(interpolation, choice(INTERPOLATIONS), "How exactly voxels keep their values, with classification after"),
+        key!(footprint, choice(FORMS), "How kernel sections are stored"),
+        key!(compositing, choice(COMPOSITINGS), "How sheets become the picture"),
+        key!(order, choice(ORDERS), "The order in which sheets are composited"),
+        key!(opacity_threshold, Number(Interval::THRESHOLD), "The opacity from which a pixel hides what is behind it"),
+        key!(culling, Switch, "Whether hidden voxels are left out"),
+        key!(tiles, Switch, "Whether only tiles that a group of sheets touches are composited"),
+        key!(rasterizer, choice(RASTERIZERS), "How the GPU draws kernel sections"),
+        key!(footprint_box, choice(BOXES), "The pixels that culling tests"),
     ];
 }
 
 impl Keyed for Economies {
     const KEYS: &'static [Key<Self>] = &[
-        key("whole_below", "Voxels of a lower opacity are projected whole", |e| {
-            Number(Interval::SHARE, &mut e.whole_below)
-        }),
-        key("beta", "Voxels behind this opacity are projected whole", |e| Number(Interval::THRESHOLD, &mut e.beta)),
-        key("resolution", "The least alpha that a footprint adds", |e| Number(Interval::SHARE, &mut e.resolution)),
+        key!(whole_below, Number(Interval::SHARE), "Voxels of a lower opacity are projected whole"),
+        key!(beta, Number(Interval::THRESHOLD), "Voxels behind this opacity are projected whole"),
+        key!(resolution, Number(Interval::SHARE), "Footprints end where they add less alpha"),
     ];
 }
 

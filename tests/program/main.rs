@@ -26,6 +26,7 @@ mod parts;
 mod program;
 mod provenance;
 mod rasterizers;
+mod schema;
 #[path = "../common/http.rs"]
 mod server;
 mod statistics;
