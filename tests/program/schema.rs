@@ -9,9 +9,7 @@ use sheetsplat::settings::Allowed;
 use crate::*;
 
 fn schema() -> Value {
-    let run = Folder::new().run("schema");
-    run.assert_success();
-    serde_json::from_str(&run.stdout).unwrap()
+    serde_json::from_str(&sheetsplat::scene::schema()).unwrap()
 }
 
 /// Whether a value is one of a schema's; of JSON Schema it knows what this schema needs.
@@ -92,6 +90,12 @@ fn allowed(set: &str) -> Allowed {
         }
         other => panic!("{set}: {other:?}"),
     }
+}
+
+#[test]
+fn the_program_prints_it() {
+    let run = Folder::new().run("schema");
+    assert_eq!((run.code, run.stdout), (Some(0), sheetsplat::scene::schema()), "{}", run.stderr);
 }
 
 #[test]
@@ -300,4 +304,28 @@ fn the_guide_has_every_key() {
         "docs/guide/scene-files.md: replace the rows of the table of keys by\n{}",
         expected.join("\n")
     );
+}
+
+/// Type checkers and editors know the keys and choices of Python's dictionaries by these classes.
+#[test]
+fn the_tables_of_python_have_every_key() {
+    let text =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("python/sheetsplat/_settings.py")).unwrap();
+    let schema = schema();
+    let mut choices = 0;
+    for table in ["camera", "image", "clip", "transfer", "shading", "splatting"] {
+        let (_, class) = text.split_once(&format!("\"\"\"The table ``[{table}]``.\"\"\"")).unwrap();
+        let fields = class.trim_start().split("\n\n").next().unwrap().lines();
+        let fields: Vec<(&str, &str)> = fields.filter_map(|line| line.trim().split_once(": ")).collect();
+        let properties = schema["properties"][table]["properties"].as_object().unwrap();
+        let names: BTreeSet<&str> = fields.iter().map(|(name, _)| *name).collect();
+        assert_eq!(names, properties.keys().map(String::as_str).collect(), "{table}");
+        for (name, literals) in fields.iter().filter(|(_, kind)| kind.starts_with("Literal")) {
+            let found: BTreeSet<&str> = literals.split('"').skip(1).step_by(2).collect();
+            let names = properties[*name]["enum"].as_array().unwrap().iter().map(|name| name.as_str().unwrap());
+            assert_eq!(found, names.collect(), "{table}.{name}");
+            choices += 1;
+        }
+    }
+    assert!(choices > 10, "{choices}");
 }
