@@ -56,27 +56,20 @@ fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
             let text = entry.value.as_str().ok_or_else(|| entry.mistyped(allowed()))?;
             choose(names.iter().position(|name| *name == text).ok_or_else(|| entry.refused(allowed()))?);
         }
-        Slot::Direction(into) => *into = direction(entry)?,
+        Slot::Direction(into) => *into = entry.numbers(Interval::FINITE)?.into(),
         Slot::Vector(range, into) => *into = Some(entry.numbers(range)?.into()),
         Slot::Light(into) => *into = light(entry)?,
         Slot::Pixels(into) => *into = entry.integer(PIXELS)?,
         Slot::Background(into) => *into = rgba(entry)?,
-        Slot::Planes(into) => {
-            let items = entry.items(&format!("an array of at most {MAX_PLANES} [nx, ny, nz, d]"))?;
-            *into = items.iter().map(|item| item.numbers(Interval::FINITE)).collect::<Result<_, _>>()?;
-        }
+        Slot::Planes(into) => *into = rows(entry, &format!("an array of at most {MAX_PLANES} [nx, ny, nz, d]"))?,
         Slot::Crop(into) => {
-            let allowed = "[[x, y, z], [x, y, z]], each number of the first below that of the second";
-            let [low, high] = entry.array(allowed)?;
-            *into = Some([direction(&low)?, direction(&high)?]);
+            let corners = "[[x, y, z], [x, y, z]], each number of the first below that of the second";
+            let [low, high] = entry.array(corners)?;
+            *into = Some([low.numbers(Interval::FINITE)?.into(), high.numbers(Interval::FINITE)?.into()]);
         }
         Slot::Colors(into) => *into = Some(points(entry, "[value, [r, g, b]]", rgb)?),
         Slot::Shares(point, into) => *into = Some(points(entry, point, |share| share.number(Interval::SHARE))?),
-        Slot::Ranges(into) => {
-            let items = entry.items("an array of one or more [lo, hi]")?;
-            let ranges = items.iter().map(|item| item.numbers(Interval::FINITE));
-            *into = Some(ranges.collect::<Result<_, _>>()?);
-        }
+        Slot::Ranges(into) => *into = Some(rows(entry, "an array of one or more [lo, hi]")?),
         Slot::Labels(into) => *into = labels(entry)?,
         Slot::Label(into) => {
             // TOML's integers end at 2⁶³.
@@ -84,8 +77,7 @@ fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
             *into = Some(quoted.unwrap_or_else(|| entry.integer(LABEL))?);
         }
         Slot::Text(allowed, into) => {
-            let text = entry.value.as_str().ok_or_else(|| entry.mistyped(allowed))?;
-            *into = Some(text.to_owned());
+            *into = Some(entry.value.as_str().ok_or_else(|| entry.mistyped(allowed))?.to_owned());
         }
         Slot::Number32(into) => *into = Some(entry.integer(COUNT)?),
         Slot::Level(into) => match entry.value.as_str() {
@@ -95,8 +87,10 @@ fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
         },
         Slot::Series(into) => {
             let number = || entry.integer::<u32>("an integer >= 0, or a SeriesInstanceUID in quotes");
-            let text = entry.value.as_str().map(str::to_owned);
-            *into = Some(text.map_or_else(|| number().map(|number| number.to_string()), Ok)?);
+            *into = Some(match entry.value.as_str() {
+                Some(text) => text.to_owned(),
+                None => number()?.to_string(),
+            });
         }
         Slot::Dims(into) => {
             let [x, y, z] = entry.array::<3>(SIZES)?.map(|size| size.integer::<i64>(SIZES));
@@ -107,9 +101,9 @@ fn read(entry: &Entry, slot: Slot) -> Result<(), SceneError> {
     Ok(())
 }
 
-/// A vector of three numbers.
-fn direction(entry: &Entry) -> Result<DVec3, SceneError> {
-    entry.numbers(Interval::FINITE).map(DVec3::from_array)
+/// An array of arrays of numbers.
+fn rows<const N: usize>(entry: &Entry, allowed: &str) -> Result<Vec<[f64; N]>, SceneError> {
+    entry.items(allowed)?.iter().map(|item| item.numbers(Interval::FINITE)).collect()
 }
 
 /// A light's name or a direction.
@@ -119,7 +113,7 @@ fn light(entry: &Entry) -> Result<Light, SceneError> {
         Some("headlight") => Ok(Light::Headlight),
         Some("upper-left") => Ok(Light::UpperLeft),
         Some(_) => Err(entry.refused(allowed)),
-        None if entry.value.is_array() => direction(entry).map(Light::Direction),
+        None if entry.value.is_array() => Ok(Light::Direction(entry.numbers(Interval::FINITE)?.into())),
         None => Err(entry.mistyped(allowed)),
     }
 }

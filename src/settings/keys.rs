@@ -81,11 +81,11 @@ impl Keyed for Shading {
         key!(diffuse, Number(Interval::NOT_NEGATIVE), "The weight of diffuse light"),
         key!(specular, Number(Interval::NOT_NEGATIVE), "The weight of the highlight"),
         key!(shininess, Number(Interval::POSITIVE), "The exponent of the highlight"),
-        key!(gradient, choice(GRADIENTS), "Where normals come from; kernel is for classification after"),
+        key!(gradient, choice(GRADIENTS), "Where normals come from; kernel needs classification after"),
         key!(occlusion, Number(Interval::SHARE), "How much matter in front dims ambient light"),
-        key!(occlusion_spread, Number(LIGHT_SPREAD), "Spread of ambient light: smallest spacings² per spacing"),
+        key!(occlusion_spread, Number(LIGHT_SPREAD), "The spread of ambient light: smallest spacings² per spacing"),
         key!(shadow, Number(Interval::SHARE), "How much matter towards the light dims other light"),
-        key!(shadow_spread, Number(LIGHT_SPREAD), "Softness of shadows: smallest spacings² per spacing"),
+        key!(shadow_spread, Number(LIGHT_SPREAD), "The softness of shadows: smallest spacings² per spacing"),
         key!(light_step, Number(LIGHT_STEP), "The distance of light sheets, in smallest voxel spacings"),
     ];
 }
@@ -95,10 +95,14 @@ impl Keyed for Splatting {
         key!(method, choice(METHODS), "Which voxels share a sheet"),
         key!(radius, Number(RADIUS), "The kernel's radius, in voxels"),
         key!(falloff, Number(FALLOFF), "The exponent of the kernel's Gaussian"),
-        key!(slab_width, Number(SLAB_WIDTH), "Along a ray, in smallest voxel spacings"),
+        key!(slab_width, Number(SLAB_WIDTH), "The slabs' width along a ray, in smallest voxel spacings"),
         key!(slab_profile, choice(PROFILES), "How values run between slab planes, with classification after"),
         key!(classification, choice(CLASSIFICATIONS), "Whether voxels are classified, or what a pixel sees of them"),
-        key!(interpolation, choice(INTERPOLATIONS), "How exactly voxels keep their values, with classification after"),
+        key!(
+            interpolation,
+            choice(INTERPOLATIONS),
+            "Whether voxels keep their exact values, with classification after"
+        ),
         key!(footprint, choice(FORMS), "How kernel sections are stored"),
         key!(compositing, choice(COMPOSITINGS), "How sheets become the picture"),
         key!(order, choice(ORDERS), "The order in which sheets are composited"),
