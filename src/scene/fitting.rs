@@ -1,6 +1,5 @@
 //! The preset that fits a volume, where a scene states nothing about its appearance.
 
-use super::slots::value;
 use crate::appearance::Preset;
 use crate::settings::key::{Key, Keyed};
 use crate::settings::shading::Shading;
@@ -89,9 +88,7 @@ impl Fitting {
     pub(super) fn fitted<T: Keyed>(self, mut stated: T, mut of_preset: T) -> T {
         let mut default = T::default();
         for Key { slot, .. } in T::KEYS.iter().filter(|key| self.leaves(key.name)) {
-            if value(&slot(&mut stated)) == value(&slot(&mut default)) {
-                slot(&mut stated).take_over(slot(&mut of_preset));
-            }
+            slot(&mut stated).fit(slot(&mut default), slot(&mut of_preset));
         }
         stated
     }

@@ -134,9 +134,9 @@ impl Text {
     /// Writes the keys that have values, some of them first. A key and whether it has its default decide if it is kept.
     fn keys<T: Keyed>(&mut self, settings: &T, first: &[&str], is_kept: impl Fn(&str, bool) -> bool) {
         let (mut settings, mut default) = (settings.clone(), T::default());
-        let mut keys: Vec<&Key<T>> = T::KEYS.iter().collect();
-        keys.sort_by_key(|key| first.iter().position(|name| *name == key.name).unwrap_or(first.len()));
-        for Key { name, slot, .. } in keys {
+        let of_first = first.iter().filter_map(|name| T::KEYS.iter().find(|key| key.name == *name));
+        let others = T::KEYS.iter().filter(|key| !first.contains(&key.name));
+        for Key { name, slot, .. } in of_first.chain(others) {
             let value = slots::value(&slot(&mut settings));
             let is_default = value == slots::value(&slot(&mut default));
             if let Some(value) = value.filter(|_| is_kept(name, is_default)) {

@@ -103,13 +103,19 @@ impl Slot<'_> {
         }
     }
 
-    /// Takes over the value of the same key of other settings, if it is one that a preset may choose.
-    pub(crate) fn take_over(self, other: Slot) {
-        match (self, other) {
-            (Self::Switch(value), Slot::Switch(other)) => *value = *other,
-            (Self::Number(_, value), Slot::Number(_, other)) => *value = *other,
-            (Self::Light(value), Slot::Light(other)) => *value = *other,
-            (Self::Choice(Choice { mut choose, .. }), Slot::Choice(Choice { chosen: Some(at), .. })) => choose(at),
+    /// Takes over the value that a preset chooses, if it is the default. Presets choose keys of few types.
+    pub(crate) fn fit(self, default: Slot, chosen: Slot) {
+        match (self, default, chosen) {
+            (Self::Switch(value), Slot::Switch(default), Slot::Switch(chosen)) if value == default => *value = *chosen,
+            (Self::Number(_, value), Slot::Number(_, default), Slot::Number(_, chosen)) if value == default => {
+                *value = *chosen;
+            }
+            (Self::Light(value), Slot::Light(default), Slot::Light(chosen)) if value == default => *value = *chosen,
+            (Self::Choice(mut value), Slot::Choice(default), Slot::Choice(Choice { chosen: Some(at), .. }))
+                if value.chosen == default.chosen =>
+            {
+                (value.choose)(at);
+            }
             _ => {}
         }
     }
