@@ -20,7 +20,8 @@ impl Folder {
 }
 
 /// The subcommands, without those of other features.
-const COMMANDS: [&str; 9] = ["render", "orbit", "sweep", "bench", "compare", "light", "adapters", "completions", "man"];
+const COMMANDS: [&str; 10] =
+    ["render", "orbit", "sweep", "bench", "compare", "light", "adapters", "schema", "completions", "man"];
 
 #[test]
 fn help_and_version_are_results() {
