@@ -40,6 +40,7 @@ use crate::part::{self, Content, Part};
 use crate::pick::Pick;
 pub use crate::rendering::{Backend, Rendering};
 use crate::scene::{OpenVolume, Scene};
+use crate::settings::splatting::Splatting;
 use crate::settings::window::Window;
 use crate::stats::Stats;
 use crate::volume::{StreamedVolume, Volume};
@@ -275,6 +276,12 @@ impl Headless {
         }
         if let Some((key, why)) = view.scene().shading.idle_light() {
             log::warn!("{key} has no effect: {why}");
+        }
+        if self.backend() == Backend::Gpu && view.scene().loses_normals_on_gpu() {
+            let Splatting { falloff, .. } = view.scene().splatting;
+            log::warn!(
+                "splatting.falloff = {falloff}: with shading.gradient = \"kernel\" a GPU loses some normals, the backend cpu none"
+            );
         }
         let store = rendering.stats.store.or(reads);
         Ok(Rendering { stats: Stats { store, ..rendering.stats }, ..rendering })

@@ -111,7 +111,8 @@ impl SampleRasterizer {
             device,
             ShadeBuffers {
                 frame: inputs.frame,
-                bricks: inputs.list().lists.first().map_or(&buffers.splats, |list| &list.buffer),
+                // Without bricks nothing is shaded, and any buffer that is read will do.
+                bricks: inputs.list().lists.first().map_or(&buffers.args, |list| &list.buffer),
                 values: volume.values(),
                 pages: volume.pages(),
                 has_holes: volume.has_holes(),

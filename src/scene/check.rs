@@ -67,7 +67,16 @@ impl TransferSettings {
     }
 }
 
+/// The falloff up to which sums in f32 hold what decides where the kernel's gradient points: a neighbour weighs e⁻⁸ of the nearest voxel.
+const MOST_FALLOFF: f64 = 8.0;
+
 impl Scene {
+    /// Whether a GPU loses the normals of some pixels, because its sums in f32 lose the neighbours' weights: with `shading.gradient = "kernel"`, above a
+    /// falloff of 8. The native backend and the f64 evaluation have them.
+    pub fn loses_normals_on_gpu(&self) -> bool {
+        self.shading.gradient == Gradient::Kernel && self.splatting.falloff > MOST_FALLOFF
+    }
+
     /// Checks all settings, as reading a scene file does. Every function that accepts a scene calls this.
     ///
     /// # Errors
