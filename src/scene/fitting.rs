@@ -32,9 +32,9 @@ pub struct Fitting {
     pub shadow: bool,
     /// [`Shading::light_step`], which depends on the volume's size where a preset lights it, also one that the scene names.
     pub light_step: bool,
-    /// [`Splatting::compositing`].
+    /// [`Splatting::compositing`](crate::settings::Splatting::compositing).
     pub compositing: bool,
-    /// [`Clip::shade_faces`].
+    /// [`Clip::shade_faces`](crate::settings::Clip::shade_faces).
     pub shade_faces: bool,
 }
 
