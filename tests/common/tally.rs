@@ -18,9 +18,6 @@ const LEFT_OUT: f64 = 1e-3;
 /// The moved scenes that show whether a pixel lies next to a decision.
 const TURNS: u64 = 6;
 
-/// The most by which rounding may move a pixel that is ill-conditioned.
-const ILL: f64 = 2e-3;
-
 /// The difference that rounding in f32 sums may make.
 const ROUNDING: f64 = 2e-5;
 
@@ -75,19 +72,12 @@ impl Tally {
         self.worst = self.worst.min(measured - required);
     }
 
-    /// Compares an image drawn with culling with the one without (SPEC §6). Culling adds in another order, which changes a pixel by no more than rounding
-    /// has already moved it from the f64 evaluation.
-    pub(crate) fn compare_culled(&mut self, case: &Case, images: (&Image, &Image, &Image), by: &str) {
-        let (expected, whole, culled) = images;
+    /// Compares an image drawn with culling with the one without (SPEC §6).
+    pub(crate) fn compare_culled(&mut self, case: &Case, (whole, culled): (&Image, &Image), by: &str) {
         let compositing = case.scene.splatting.compositing;
         let is_gradual = matches!(compositing, Compositing::Linear | Compositing::Exponential);
         let allowed = if is_gradual { 1.0 - case.scene.splatting.opacity_threshold } else { 0.0 } + ROUNDING;
-        let pixels = expected.pixels.iter().zip(&whole.pixels).zip(&culled.pixels);
-        let beyond = |((expected, whole), culled): ((&[f32; 4], &[f32; 4]), &[f32; 4])| {
-            let moved = size(&error(*expected, *whole)).min(ILL);
-            size(&error(*whole, *culled)) - moved
-        };
-        let measured = pixels.map(beyond).fold(0.0, f64::max);
+        let measured = largest_difference(whole, culled);
         if measured > allowed {
             let text = format!("{by}: culling changes {measured}, allowed {allowed}; {}", case.describe());
             self.failures.push(text);
