@@ -14,8 +14,8 @@ pub(crate) use sheetsplat_volume::internals::HollowChannel;
 pub(crate) use sheetsplat_volume::internals::archive_and_inner;
 pub(crate) use sheetsplat_volume::internals::{
     Access, AdaptedStore, COLOR_BYTES, MEMBERSHIP_REACH, Resampling, SIZES, SPACING, Selection, Thinned, are_sharp,
-    check_grids, check_spacing, dims_of, is_address, labels_of, levels, range, raw_store, sample_of_channels, store,
-    stores, written_in,
+    builtin_name, check_grids, check_spacing, dims_of, is_address, labels_of, levels, range, raw_store,
+    sample_of_channels, store, stores, written_in,
 };
 #[cfg(feature = "codecs")]
 pub(crate) use sheetsplat_volume::internals::{npy, npz};

@@ -5,7 +5,7 @@ use std::path::{Component, Path, PathBuf};
 
 use crate::scene::writer::invalid;
 use crate::scene::{Channel, Scene, SceneError};
-use crate::volume::is_address;
+use crate::volume::{builtin_name, is_address};
 
 /// The files that a scene names, and their names in a picture's text.
 pub(super) struct Names {
@@ -70,7 +70,7 @@ impl Names {
 /// The files that a scene names: volumes, labels, and tables of labels.
 pub(super) fn files_of(scene: &Scene) -> Vec<PathBuf> {
     let of_channel = |channel: &Channel| {
-        let table = channel.label_table.clone().filter(|path| !path.to_string_lossy().starts_with("builtin:"));
+        let table = channel.label_table.clone().filter(|path| builtin_name(path).is_none());
         [channel.volume.path().map(Path::to_path_buf), channel.labels.clone(), table]
     };
     scene.channels.iter().flat_map(of_channel).flatten().collect()

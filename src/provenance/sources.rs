@@ -1,7 +1,8 @@
-//! The files and values behind a picture's volume: hashes of files that were read whole, and of values where the files were read in pieces or there are none.
+//! Hashes that identify the volume of a picture. A file that was read whole has the hash of its bytes. Where files were read in pieces, or the volume came from
+//! memory, each channel's values have one.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use super::names::{Names, files_of};
@@ -75,12 +76,5 @@ fn hash_up_to(path: &Path, most: u64) -> io::Result<Option<String>> {
 
 /// The hash of a file's bytes.
 pub(super) fn hash_of(path: &Path) -> io::Result<String> {
-    let (mut file, mut hash) = (File::open(path)?, blake3::Hasher::new());
-    let mut block = vec![0; 1 << 20];
-    loop {
-        match file.read(&mut block)? {
-            0 => return Ok(hash.finalize().to_hex().to_string()),
-            count => _ = hash.update(&block[..count]),
-        }
-    }
+    Ok(blake3::Hasher::new().update_reader(File::open(path)?)?.finalize().to_hex().to_string())
 }

@@ -111,7 +111,7 @@ impl SampleRasterizer {
             device,
             ShadeBuffers {
                 frame: inputs.frame,
-                // Without bricks nothing is shaded, and any buffer that is read will do.
+                // Without bricks nothing is shaded, and the binding takes any buffer that is only read and holds a brick.
                 bricks: inputs.list().lists.first().map_or(&buffers.args, |list| &list.buffer),
                 values: volume.values(),
                 pages: volume.pages(),

@@ -67,7 +67,7 @@ impl TransferSettings {
     }
 }
 
-/// The falloff up to which sums in f32 hold what decides where the kernel's gradient points: a neighbour weighs e⁻⁸ of the nearest voxel.
+/// The largest falloff at which sums in f32 keep the kernel's gradient. There a neighbour weighs e⁻⁸ times as much as the voxel at the point.
 const MOST_FALLOFF: f64 = 8.0;
 
 impl Scene {

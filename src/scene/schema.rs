@@ -55,7 +55,7 @@ fn table<T: Keyed>() -> Value {
     json!({"type": "object", "properties": properties.collect::<Map<_, _>>(), "additionalProperties": false})
 }
 
-/// What a key's value may be.
+/// The schema of a key's value.
 fn form(slot: &Slot) -> Value {
     let (share, finite) = (&Interval::SHARE, &Interval::FINITE);
     let whole = |least: u32| json!({"type": "integer", "minimum": least, "maximum": u32::MAX});

@@ -12,7 +12,7 @@ use crate::settings::camera_table::CameraTable;
 use crate::settings::economies::{Economies, TABLE};
 use crate::settings::key::{Key, Keyed};
 use crate::settings::splatting::Splatting;
-use crate::volume::{RawLayout, SampleType, check_spacing, written_in};
+use crate::volume::{RawLayout, SampleType, builtin_name, check_spacing, written_in};
 
 /// The tables of one channel.
 pub(super) struct ChannelTables<'a> {
@@ -120,7 +120,10 @@ fn volume(section: Section, folder: &Path, given: Option<VolumeSource>) -> Resul
             return Err(origins.invalid(&format!("{key}.dims"), &[], found, format!("{key}.path")));
         }
     };
-    let table = |text: String| if text.starts_with("builtin:") { text.into() } else { written_in(folder, &text) };
+    let table = |text: String| match builtin_name(Path::new(&text)) {
+        Some(_) => text.into(),
+        None => written_in(folder, &text),
+    };
     let labels = labels.map(|path| written_in(folder, &path));
     Ok(Channel { volume, labels, label_table: label_table.map(table), ..channel })
 }

@@ -14,7 +14,7 @@ use crate::settings::clip::Clip;
 use crate::settings::economies::TABLE;
 use crate::settings::key::{Key, Keyed, Slot};
 use crate::settings::shading::Shading;
-use crate::volume::{RawLayout, is_address};
+use crate::volume::{RawLayout, builtin_name, is_address};
 
 /// The maximum number of control points written on one line.
 const ON_ONE_LINE: usize = 3;
@@ -110,9 +110,9 @@ fn write_channel(text: &mut Text, name_of_file: &NameOfFile<'_>, channel: &Chann
         VolumeSource::Memory => {}
     }
     table.labels = channel.labels.as_ref().map(|path| within("labels", path)).transpose()?;
-    let of_labels = channel.label_table.as_ref().map(|path| match path.to_str() {
-        Some(name) if name.starts_with("builtin:") => Ok(name.to_owned()),
-        _ => within("label_table", path),
+    let of_labels = channel.label_table.as_ref().map(|path| match builtin_name(path) {
+        Some(name) => Ok(format!("builtin:{name}")),
+        None => within("label_table", path),
     });
     table.label_table = of_labels.transpose()?;
     // A later channel without a volume is one of the first one's.

@@ -81,7 +81,7 @@ fn read(set: &str) -> Result<Scene, SceneError> {
     Scene::parse("volume.builtin = \"head\"", "scene.toml", Path::new(""), &[set.to_owned()])
 }
 
-/// What the reader allows in place of a setting that it must refuse.
+/// The values that the reader names as allowed where it refuses a setting.
 fn allowed(set: &str) -> Allowed {
     match read(set) {
         Err(SceneError::Invalid { key, allowed, .. }) => {

@@ -194,3 +194,19 @@ fn light_sheets_are_counted_and_idle_keys_named() {
         assert_eq!(run.stderr.matches(key).count(), 1, "{sets}: {}", run.stderr);
     }
 }
+
+/// A GPU loses normals of steep kernels' gradients, which is said; the native backend loses none.
+#[test]
+fn normals_that_a_gpu_loses_are_told() {
+    let folder = Folder::new();
+    let steep = "--set shading.gradient=kernel --set splatting.classification=after --set splatting.falloff";
+    for (sets, count) in [
+        (format!("{steep}=9 --backend gpu"), 1),
+        (format!("{steep}=8 --backend gpu"), 0),
+        (format!("{steep}=9 --backend cpu"), 0),
+    ] {
+        let run = folder.run(&format!("render {SMALL} {sets} -o steep.npy"));
+        run.assert_success();
+        assert_eq!(run.stderr.matches("a GPU loses some normals").count(), count, "{sets}: {}", run.stderr);
+    }
+}

@@ -2,7 +2,7 @@
 import { SheetSplat, marks } from "../dist/index.js";
 import { Clip } from "./clip.js";
 import { chosen, dropped, save } from "./files.js";
-import { Window, showSides } from "./looks.js";
+import { WindowLevel, showSides } from "./looks.js";
 import { Plot, short } from "./plot.js";
 import { askForm, isBare } from "./raw.js";
 
@@ -278,7 +278,7 @@ function listenForSettings() {
 function listenForTheRest() {
     view.on("frame", showStats);
     view.on("error", complain);
-    const range = new Window();
+    const range = new WindowLevel();
     view.on("window", (dragged) => facts && change(range.settings(dragged, facts.channels[channel], of)));
     let end = marks(view);
     at("marks").addEventListener("change", () => {

@@ -36,7 +36,7 @@ export function showSides({ orientation }, view) {
 const WIDER = 8;
 
 /** Window and level: a drag to the right widens the range over which a channel's opacity and colours run, a drag down moves it to lower values. */
-export class Window {
+export class WindowLevel {
     #start;
 
     /** The settings of a drag by heights of the picture: the points of `channel` moved about their middle. `key` names its settings. */

@@ -9,6 +9,11 @@ pub fn is_address(path: &Path) -> bool {
     path.to_str().is_some_and(|text| ["http://", "https://"].iter().any(|scheme| begins(text, scheme)))
 }
 
+/// The name of a builtin table in a path `builtin:NAME`.
+pub fn builtin_name(path: &Path) -> Option<&str> {
+    path.to_str()?.strip_prefix("builtin:")
+}
+
 /// A path that is written in a folder: one that is relative leads from there, an address does not.
 pub fn written_in(folder: &Path, path: &str) -> PathBuf {
     if is_address(Path::new(path)) { PathBuf::from(path) } else { folder.join(path) }

@@ -6,6 +6,7 @@ use glam::DVec3;
 
 use super::Volume;
 use super::access::{Access, ReadOptions};
+use super::address::builtin_name;
 use super::error::volume::{VolumeError, invalid};
 use super::loaded::Legend;
 
@@ -42,7 +43,7 @@ impl LabelTable {
     /// [`Self::open`] with what a scene may read, or [`Self::freesurfer`] by its name `builtin:freesurfer`.
     #[doc(hidden)]
     pub fn read(path: &Path, access: &Access) -> Result<Self, VolumeError> {
-        match path.to_str().and_then(|path| path.strip_prefix("builtin:")) {
+        match builtin_name(path) {
             Some("freesurfer") => return Ok(Self::freesurfer()),
             Some(_) => {
                 return Err(invalid(path, "label table", "another name", "builtin:freesurfer, or a file's path"));

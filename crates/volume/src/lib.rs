@@ -136,7 +136,7 @@ pub use glam;
 pub mod internals {
     pub use crate::access::Access;
     pub use crate::adapted::AdaptedStore;
-    pub use crate::address::{archive_and_inner, is_address, written_in};
+    pub use crate::address::{archive_and_inner, builtin_name, is_address, written_in};
     pub use crate::borders::are_sharp;
     pub use crate::error::setting;
     pub use crate::format::levels;

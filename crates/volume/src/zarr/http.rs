@@ -63,7 +63,7 @@ pub(super) struct Http {
     limits: Limits,
     /// The lengths of values that are known; `None` for keys that the store does not hold.
     lengths: Mutex<HashMap<String, Option<u64>>>,
-    /// The first key that the store held, which are its metadata.
+    /// The first key that was found, which holds the store's metadata.
     first: OnceLock<String>,
     /// Whether a key was missing since the store was last known to be there.
     has_missed: AtomicBool,

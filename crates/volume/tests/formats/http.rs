@@ -8,6 +8,7 @@ use glam::UVec3;
 use sheetsplat_volume::{Files, ReadOptions, Volume, VolumeError, open_store};
 
 use super::server::Server;
+use super::zarr::write_sparse;
 use super::{DIMS, Folder, fixture, values};
 
 /// An image of whole chunks, and one of shards.
@@ -81,14 +82,7 @@ fn chunks_are_asked_for_once() {
 fn stores_that_are_removed_are_errors() {
     let folder = Folder::new();
     let store = folder.0.path().join("a.zarr");
-    let metadata = serde_json::json!({
-        "zarr_format": 3, "node_type": "array", "shape": [4, 4, 4], "data_type": "uint8", "fill_value": 7,
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [2, 2, 2]}},
-        "chunk_key_encoding": {"name": "default"}, "codecs": [{"name": "bytes"}],
-    });
-    fs::create_dir_all(store.join("c/0/0")).unwrap();
-    fs::write(store.join("zarr.json"), metadata.to_string()).unwrap();
-    fs::write(store.join("c/0/0/0"), [1; 8]).unwrap();
+    write_sparse(&store);
     let server = Server::new(folder.0.path().to_owned());
     let address = format!("{}/files/a.zarr", server.address);
     let opened = open_store(Path::new(&address), &ReadOptions::default()).unwrap();

@@ -1,6 +1,7 @@
 //! Zarr stores, which `tests/fixtures/make_zarr.py` writes by zarr-python, ome-zarr and ngff-zarr.
 
 use std::fs;
+use std::path::Path;
 
 use glam::{DVec3, UVec3};
 use serde_json::{Value, json};
@@ -94,11 +95,8 @@ fn missing_chunks_have_the_fill_value() {
     assert!((1..1000).contains(&read), "{read}");
 }
 
-/// A store that is gone is no store without chunks, nor is one that lost a chunk.
-#[test]
-fn stores_that_are_removed_are_errors() {
-    let folder = Folder::new();
-    let store = folder.0.path().join("a.zarr");
+/// Writes a store of 8 chunks, of which it holds the first, with ones; the others are 7.
+pub(crate) fn write_sparse(store: &Path) {
     let metadata = json!({
         "zarr_format": 3, "node_type": "array", "shape": [4, 4, 4], "data_type": "uint8", "fill_value": 7,
         "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": [2, 2, 2]}},
@@ -107,6 +105,14 @@ fn stores_that_are_removed_are_errors() {
     fs::create_dir_all(store.join("c/0/0")).unwrap();
     fs::write(store.join("zarr.json"), metadata.to_string()).unwrap();
     fs::write(store.join("c/0/0/0"), [1; 8]).unwrap();
+}
+
+/// A store that is gone is no store without chunks, nor is one that lost a chunk.
+#[test]
+fn stores_that_are_removed_are_errors() {
+    let folder = Folder::new();
+    let store = folder.0.path().join("a.zarr");
+    write_sparse(&store);
     let open = || open_store(&store, &ReadOptions::default()).unwrap();
     let [one, another] = [open(), open()];
     let read = |store: &dyn sheetsplat_volume::Store, from: UVec3| {

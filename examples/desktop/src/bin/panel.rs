@@ -10,7 +10,7 @@ use glam::DVec2;
 use sheetsplat::settings::{Clip, navigation};
 use sheetsplat::{Blend, DeviceRequirements, GpuVolume, Placement, Renderer, RendererOptions, Scene, SceneView, wgpu};
 
-/// What egui's own textures have.
+/// The format of egui's own textures.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Degrees that the camera turns for a drag over the panel's whole height.
